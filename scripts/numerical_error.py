@@ -22,7 +22,7 @@ from contact_campaign import TIGHTER, Drawn, arguments, ours_at, scene_of, sprea
 
 from walkerlab.evidence.paper.tune import walk_summary
 from walkerlab.labels import ERROR_OF_EACH_STEP
-from walkerlab.pipeline.stages.numerical_error import change
+from walkerlab.pipeline.stages.walk import change
 
 ERRORS = (*ERROR_OF_EACH_STEP.values(), "end_time_s")
 FACTORS = (1.5, 10.0)

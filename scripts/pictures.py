@@ -30,7 +30,7 @@ from walkerlab.views.cli.exports import gif
 from walkerlab.views.figures import robustness
 from walkerlab.views.figures import sweep as sweep_figures
 from walkerlab.views.figures.canvas import Drawing, as_file
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.figures.stick_diagram import film_times, pictures, read_sticks
 
 ROOT = Path(__file__).parent.parent

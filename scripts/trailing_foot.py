@@ -20,7 +20,7 @@ from flip_shift import Ground, config_of
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from walkerlab.evidence.benchmarks.contact_trials import contact_trial
+from walkerlab.evidence.benchmarks.trials import contact_trial
 from walkerlab.physics.ground.motion import motion_gradient
 from walkerlab.physics.ground.walker import (
     LOCKED,

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from walkerlab.physics.mechanics import impact
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
+from walkerlab.physics.mechanics.parts import Anchor, levers, masses
 from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,

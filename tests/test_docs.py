@@ -24,10 +24,10 @@ from walkerlab.config import reads
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.physics.ground.friction import friction_coefficient
-from walkerlab.physics.ground.laws import LAW_KINDS, missing_members
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.scene.contact import LAW_KINDS, missing_members
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration
 

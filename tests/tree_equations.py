@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.mechanics.assembly import Anchor, tree_about, tree_about_centre
-from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, tree_about, tree_about_centre
 
 Floats = NDArray[np.float64]
 

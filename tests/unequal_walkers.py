@@ -7,7 +7,7 @@ from plain_unequal_walk import Leg, Segment, Walker
 
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import pair, replace_fields
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, replace_second_leg, straight_legs
+from walkerlab.scene.parts import Arc, Limb, kneed_legs, replace_second_leg, straight_legs
 
 KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
 

@@ -1,7 +1,5 @@
 """Digest of a module's source and of everything it imports, computed without importing it."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import re
@@ -42,7 +40,7 @@ class Sources:
         texts = [(module.name, module.text) for module in closure if module.name != PACKAGE]
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
-    def closure(self, *names: str) -> list[Module]:
+    def closure(self, *names: str) -> "list[Module]":
         """Return modules and all direct and indirect imports from their own packages and this one, sorted by name.
 
         Raises ModuleNotFoundError if there is no such module.
@@ -62,13 +60,13 @@ class Sources:
                     queue.append(module)
         return [modules[name] for name in sorted(modules)]
 
-    def module(self, name: str) -> Module | None:
+    def module(self, name: str) -> "Module | None":
         """Return the module with a full name, or None if it has no file."""
         if name not in self._modules:
             self._modules[name] = self._find(name)
         return self._modules[name]
 
-    def _find(self, name: str) -> Module | None:
+    def _find(self, name: str) -> "Module | None":
         parent, _, last = name.rpartition(".")
         if not parent:
             spec = importlib.util.find_spec(last)

@@ -5,8 +5,6 @@ group `walkerlab.extensions`. An extension names its code in quotes, "module:nam
 other modules ask this one for what extensions add, so none of them names a module of a higher layer.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

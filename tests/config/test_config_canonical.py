@@ -11,8 +11,8 @@ import pytest
 
 from walkerlab.config import reads, schema
 from walkerlab.config.analyses import Basin, Case, Continuation, Design, Robustness
+from walkerlab.config.contact import Footholds
 from walkerlab.config.drives import PushOff
-from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import (
     ContactConfig,

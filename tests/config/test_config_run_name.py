@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from walkerlab.config.fields import short_number
 from walkerlab.config.loader import load
-from walkerlab.config.numbers import short_number
 
 
 def name_of(*sets: str, path: Path | None = None, strides: int | None = None) -> str:

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from walkerlab.config import schema
 from walkerlab.config.fields import Block, annotation_of, leaves
 from walkerlab.config.loader import load
-from walkerlab.config.schema import METHODS, CompassWalker, Config, Contact, SolverSettings
-from walkerlab.config.walkers import Kneed, Shank
+from walkerlab.config.schema import METHODS, Config, Contact, SolverSettings
+from walkerlab.config.walkers import CompassWalker, Kneed, Shank
 from walkerlab.errors import ConfigError
 
 

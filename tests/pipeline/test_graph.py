@@ -176,7 +176,7 @@ def test_editing_an_evidence_stage_changes_only_its_key(made_of, stage):
 def test_results_do_not_depend_on_the_registries(made_of, stage):
     registries = {
         "walkerlab.pipeline.plan.graph",
-        "walkerlab.views.figures.registry",
+        "walkerlab.views.figures.stage",
         "walkerlab.views.report.registry",
     }
     registries |= {f"walkerlab{code.partition(':')[0]}" for code in walkerlab.EXTENSIONS.values()}

@@ -9,7 +9,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.run.workers import WorkerDiedError
-from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.files import Checkpoint
 
 
 @pytest.fixture

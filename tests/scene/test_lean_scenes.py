@@ -14,7 +14,7 @@ from walkerlab.config.loader import load
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb, Frictionless, switching_count
 from walkerlab.physics.ground.walker import FootMotion, feet_motion, foot_force, place_on_ground
-from walkerlab.physics.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
+from walkerlab.physics.hybrid.contact_state import FRICTION_SWITCHES, MATERIAL
 from walkerlab.physics.mechanics.parts import Assembly, Body, Particle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.progress import Silent

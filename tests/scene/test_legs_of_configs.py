@@ -20,10 +20,10 @@ from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, continuation
 from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
-from walkerlab.scene.families import contact_map
 from walkerlab.scene.parameter import SLOPE
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
+from walkerlab.scene.subject import contact_map
 
 HEAVY = "walker.leg_2={leg_mass_kg: 5.5}"
 KNEES = "walker.leg_2={shank: {mass_kg: 0.053}, thigh: {length_m: 0.502}}"

@@ -11,7 +11,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, stiff_ground_trial
+from walkerlab.evidence.benchmarks.trials import CREEP_FACTOR, stiff_ground_trial
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.extensions import WORDS
 from walkerlab.physics.ground import friction

@@ -12,10 +12,10 @@ from walkerlab.errors import ConfigError
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.contact import contact_scene
-from walkerlab.scene.families import iterate_values
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.studies import equation_sets
+from walkerlab.scene.subject import iterate_values
 
 DOCS = Path(__file__).parents[2] / "docs" / "walkers.md"
 

@@ -2,23 +2,8 @@
 
 import warnings
 
-from walkerlab.api.memory import (
-    basin,
-    check,
-    compass,
-    contact,
-    continue_gait,
-    design,
-    explore,
-    find_gait,
-    identify,
-    kneed,
-    plan_measurements,
-    read_walk,
-    robustness,
-    simulate,
-    walker,
-)
+from walkerlab.api import memory
+from walkerlab.api.memory import *  # noqa: F403 (it lists its names)
 from walkerlab.api.models import export_model, mujoco_model
 from walkerlab.api.results import Gait, Result, dataset
 from walkerlab.api.runs import Run, open_run, run, sweep
@@ -29,7 +14,6 @@ from walkerlab.extensions import check_names
 check_names(warnings.warn)
 
 __all__ = [
-    "Config", "ConfigError", "Gait", "Result", "Run", "basin", "check", "compass", "contact", "continue_gait",
-    "dataset", "design", "explore", "export_model", "find_gait", "identify", "kneed", "mujoco_model", "open_run",
-    "plan_measurements", "read_walk", "robustness", "run", "simulate", "sweep", "walker",
+    *memory.__all__, "Config", "ConfigError", "Gait", "Result", "Run", "dataset", "export_model", "mujoco_model",
+    "open_run", "run", "sweep",
 ]  # fmt: skip

@@ -25,11 +25,15 @@ from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.files import csv_text
 
 if TYPE_CHECKING:
     from walkerlab.views.explore.server import Server
 
+__all__ = [
+    "basin", "check", "compass", "contact", "continue_gait", "design", "explore", "find_gait", "identify", "kneed",
+    "plan_measurements", "read_walk", "robustness", "simulate", "walker",
+]  # fmt: skip
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     "walker": (
         tuple(kinds_of(Config.model_fields["walker"]).values()),

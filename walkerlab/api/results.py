@@ -177,7 +177,7 @@ class Result:
 
     def _drawable(self) -> dict[str, Illustration]:
         # Imported here: it loads matplotlib.
-        from walkerlab.views.figures.registry import FIGURES
+        from walkerlab.views.figures.stage import FIGURES
 
         results = {self.stage: cast(Identified, self.content)}
         figures = (figure for figure in FIGURES if figure.stages == (self.stage,))

@@ -152,10 +152,7 @@ class Design(Block):
     minimise: Quantity | None = key(None, "", "gait quantity to minimise")
     maximise: Quantity | None = key(None, "", "gait quantity to maximise")
     over: Bounds = key(
-        dict,
-        "",
-        "parameters that may vary, with bounds in the key's unit",
-        bounds="[A, B] for each key, A below B",
+        dict, "", "parameters that may vary, with bounds in the key's unit", bounds="[A, B] for each key, A below B"
     )
     keep: Bounds = key(dict, "", "gait quantities to constrain", bounds=f"[A, B] for each of {_QUANTITY_NAMES}")
     model: Literal["rigid", "contact"] = key("rigid", "", "model whose gait is optimised")

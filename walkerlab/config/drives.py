@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from walkerlab.config.fields import Block, key
-from walkerlab.config.numbers import short_number
+from walkerlab.config.fields import Block, key, short_number
 from walkerlab.config.second_leg import SecondPushOff
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"

@@ -1,7 +1,12 @@
-"""Annotations of config keys (unit, bounds, meaning, source), and functions that describe keys and blocks."""
+"""Annotations of config keys (unit, bounds, meaning, source), descriptions of keys and blocks, and the shortest exact
+notation of numbers.
+"""
 
+import math
+import re
 import types
 from collections.abc import Callable, Iterable, Iterator
+from decimal import Decimal
 from functools import reduce
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
@@ -10,8 +15,32 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, Validati
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from walkerlab.config.numbers import short_number
 from walkerlab.labels import add_unit
+
+RELATIVE_ROUNDING: Final = 1e-9
+"""Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
+
+DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
+
+
+def short_number(number: float) -> str:
+    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6. Integers are
+    written in full.
+    """
+    if isinstance(number, int):
+        return str(number)
+    plain = repr(number).removesuffix(".0")
+    if 1e-4 <= abs(number) < 1e5 or number == 0:
+        return plain
+    digits, exponent = f"{Decimal(repr(number)).normalize():E}".split("E")
+    return min(plain, f"{digits}e{int(exponent)}", key=len)
+
+
+def are_equal(first: Any, second: Any) -> bool:
+    """Whether two values are equal, numbers up to rounding."""
+    if isinstance(first, float | int) and isinstance(second, float | int):
+        return math.isclose(first, second, rel_tol=RELATIVE_ROUNDING)
+    return bool(first == second)
 
 
 class Block(BaseModel):

@@ -13,22 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from walkerlab.config import files
 from walkerlab.config.analyses import Case
-from walkerlab.config.fields import block_of
-from walkerlab.config.files import (
-    DEFAULT,
-    ConfigFile,
-    ConfigSetting,
-    apply_settings,
-    builtin_config,
-    find_config,
-    merge_layers,
-    option_setting,
-    parse_setting,
-    read_layers,
-    replace_cases_file,
-)
-from walkerlab.config.numbers import short_number
+from walkerlab.config.fields import block_of, short_number
 from walkerlab.config.problems import Problem, problem_error
 from walkerlab.config.reads import flatten
 from walkerlab.config.schema import QUESTIONS, Config
@@ -70,17 +57,17 @@ class LoadedConfig:
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
-    def variant(self, settings: Sequence[ConfigSetting]) -> Config:
+    def variant(self, settings: Sequence[files.ConfigSetting]) -> Config:
         """Return the config with some keys changed.
 
         Raises ConfigError with positions if it is invalid.
         """
-        tree = apply_settings(self.tree, settings)
+        tree = files.apply_settings(self.tree, settings)
         return align_start(validate_tree(tree), tree)[0]
 
 
 def load(
-    path: Path | ConfigFile | None = None,
+    path: Path | files.ConfigFile | None = None,
     sets: Sequence[str] = (),
     strides: int | None = None,
     name: str | None = None,
@@ -94,17 +81,23 @@ def load(
 
     Raises a ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
-    file = path if isinstance(path, ConfigFile) else builtin_config(DEFAULT) if path is None else find_config(path)
-    tree = merge_layers(read_layers(file))
+    file = (
+        path
+        if isinstance(path, files.ConfigFile)
+        else files.builtin_config(files.DEFAULT)
+        if path is None
+        else files.find_config(path)
+    )
+    tree = files.merge_layers(files.read_layers(file))
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:
         safe = safe_name(file.path.stem)
         tree = tree.copy_without()
         tree.put("name", Scalar(start, safe, safe), start)
-    settings = [parse_setting(text) for text in sets]
+    settings = [files.parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
-    settings += [option_setting(key, value) for key, value in options.items() if value is not None]
-    changed_tree = replace_cases_file(apply_settings(tree, settings), Path())
+    settings += [files.option_setting(key, value) for key, value in options.items() if value is not None]
+    changed_tree = files.replace_cases_file(files.apply_settings(tree, settings), Path())
     changed = validate_tree(changed_tree)
     base = validate_tree(tree) if settings else changed
     check_cases(changed, changed_tree)
@@ -245,13 +238,13 @@ def paper_config_with_tree(upper: BlockNode) -> Config:
     Raises ConfigError with positions if the result is invalid.
     """
     # With SI units, keys missing in the contact block keep the paper's physical value, not its number in N, mm, s.
-    layers = read_layers(builtin_config(DEFAULT))
+    layers = files.read_layers(files.builtin_config(files.DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, BlockNode) else None
     if isinstance(units, Scalar) and units.value == "si":
         layers = [layer.copy_without("contact") for layer in layers]
-    tree = merge_layers([*layers, upper])
-    tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
+    tree = files.merge_layers([*layers, upper])
+    tree.put("name", Scalar(upper.position, files.DEFAULT, files.DEFAULT), upper.position)
     return align_start(validate_tree(tree), tree)[0]
 
 

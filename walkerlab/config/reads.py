@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from walkerlab.config import schema
     from walkerlab.config.analyses import Basin, Case, Continuation, Design, Plan, Robustness
     from walkerlab.config.check import Check
-    from walkerlab.config.contact import Contact
+    from walkerlab.config.contact import Contact, Footholds
     from walkerlab.config.drives import PushOff
-    from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.second_leg import SecondPushOff

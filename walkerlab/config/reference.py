@@ -10,9 +10,8 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import annotation_of, bounds_of, describe_type, leaves, leaves_of_other_kinds
+from walkerlab.config.fields import annotation_of, bounds_of, describe_type, leaves, leaves_of_other_kinds, short_number
 from walkerlab.config.files import builtin_names
-from walkerlab.config.numbers import short_number
 from walkerlab.config.problems import nearest
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError

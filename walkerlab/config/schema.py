@@ -7,22 +7,14 @@ from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
+from walkerlab.config import walkers
 from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
-from walkerlab.config.contact import Contact
+from walkerlab.config.contact import Contact, Footholds
 from walkerlab.config.drives import PushOff, acting_on, push_offs
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
-from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
-from walkerlab.config.walkers import (
-    CompassWalker,
-    Walker,
-    explain_wrong_state,
-    is_passive_compass,
-    why_no_contact,
-    why_no_push_off,
-)
 from walkerlab.extensions import words
 
 Equations = str
@@ -180,9 +172,7 @@ class Tune(Block):
     swing_factors: Factors = factors(0.0, 2.0, "swing leg's initial angular velocity dtheta_1")
     stance_factors: Factors = factors(0.85, 1.3, "stance leg's initial angular velocity dtheta_2")
     rigid_limit: bool = key(
-        True,
-        "",
-        "whether to also stiffen the contact towards the rigid limit, to find where deviations fall to 1e-4",
+        True, "", "whether to also stiffen the contact towards the rigid limit, to find where deviations fall to 1e-4"
     )
 
     @field_validator("swing_factors", "stance_factors")
@@ -227,7 +217,7 @@ class Config(Block):
         pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$",
     )
     source: Source | None = None
-    walker: Walker = key(CompassWalker(), "", "the walker; its keys depend on its type", "Fig. 1")
+    walker: walkers.Walker = key(walkers.CompassWalker(), "", "the walker; its keys depend on its type", "Fig. 1")
     gravity_m_s2: float = key(9.81, "m/s^2", "g, gravity", "Table 1", ge=1e-6, le=1e4)
     slope_rad: float = key(
         0.0174,
@@ -273,11 +263,11 @@ class Config(Block):
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of all random numbers", ge=0, le=2**32 - 1)
 
-    _fits = check_against("start", "walker", explain_wrong_state)
+    _fits = check_against("start", "walker", walkers.explain_wrong_state)
     _pushes = check_against(
-        "push_off", "walker", lambda value, walker: why_no_push_off(walker) if any(push_offs(value)) else ""
+        "push_off", "walker", lambda value, walker: walkers.why_no_push_off(walker) if any(push_offs(value)) else ""
     )
-    _stands = check_against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
+    _stands = check_against("contact", "walker", lambda value, walker: walkers.why_no_contact(walker) if value else "")
 
     @field_validator("start", mode="before")
     @classmethod
@@ -293,7 +283,7 @@ class Config(Block):
             values = SimpleNamespace(**info.data)
             if acting := acting_on(values):
                 raise meaning_error(f"is for a passive compass, but this walker has {', '.join(acting)}")
-            if not is_passive_compass(values):
+            if not walkers.is_passive_compass(values):
                 raise meaning_error("is for a compass, which this walker is not")
         return value
 

@@ -101,10 +101,7 @@ def lock_knee(thigh: Any, shank: Any) -> dict[str, float]:
     mass = thigh.mass_kg + shank.mass_kg
     below = thigh.mass_kg * thigh.mass_below_hip_m + shank.mass_kg * (thigh.length_m + shank.mass_below_knee_m)
     ahead = thigh.mass_kg * thigh.mass_ahead_m + shank.mass_kg * shank.mass_ahead_m
-    apart = (
-        thigh.length_m + shank.mass_below_knee_m - thigh.mass_below_hip_m,
-        shank.mass_ahead_m - thigh.mass_ahead_m,
-    )
+    apart = (thigh.length_m + shank.mass_below_knee_m - thigh.mass_below_hip_m, shank.mass_ahead_m - thigh.mass_ahead_m)
     reduced = thigh.mass_kg * shank.mass_kg / mass
     return {
         "leg_length_m": thigh.length_m + shank.length_m,

@@ -8,10 +8,9 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from walkerlab.config import fields
 from walkerlab.config.contact import BOUNDS_SI
-from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, merge_layers, read_layers
-from walkerlab.config.numbers import DECIMAL_COMMA, short_number
 from walkerlab.config.problems import (
     Problem,
     explain_missing_feature,
@@ -119,9 +118,9 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
         before, start[place] = stated[place], value
         if before is None or abs(value - before) <= MOVED_RAD:
             continue
-        change = f"start: {name} {{}} {short_number(before)} {{}} {short_number(value)} {unit}, {because}"
+        change = f"start: {name} {{}} {fields.short_number(before)} {{}} {fields.short_number(value)} {unit}, {because}"
         if abs(value - before) > FAR_OFF:
-            as_it_is = ", ".join("null" if each is None else short_number(each) for each in stated)
+            as_it_is = ", ".join("null" if each is None else fields.short_number(each) for each in stated)
             midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
             raise problem_error(where, change.format("is", "but must be"), advice=advice)
@@ -201,15 +200,15 @@ def _place(problem: Problem) -> tuple[str, int, int]:
     return (where.source, where.line, where.column) if where else ("", 0, 0)
 
 
-def _problems(error: ValidationError, tree: BlockNode, model: type[Block]) -> list[Problem]:
+def _problems(error: ValidationError, tree: BlockNode, model: type[fields.Block]) -> list[Problem]:
     details = error.errors(include_url=False)[:MAX_PROBLEMS]
     return [_problem(detail, tree, model) for detail in details if detail["type"] != _FOLLOWS_FROM_ANOTHER]
 
 
-def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Problem:
+def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -> Problem:
     location = detail["loc"]
     what = detail["type"]
-    kinds = kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
+    kinds = fields.kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
     if what == "union_tag_invalid":
         node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
@@ -227,7 +226,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
     key = ".".join(path)
     node, position = node_at(tree, location)
     if node is None and what == "missing":
-        return Problem(position, f"{key}: is missing", describe_allowed(field))
+        return Problem(position, f"{key}: is missing", fields.describe_allowed(field))
     value = format_node(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
@@ -238,10 +237,10 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
             text = f"contact.{judge}: {key} is still {value} (from {position.source}) and {reason}"
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
-    meant = nearest(word, words_of(field.annotation)) if word else ""
-    if what == "float_type" and DECIMAL_COMMA.fullmatch(word):
+    meant = nearest(word, fields.words_of(field.annotation)) if word else ""
+    if what == "float_type" and fields.DECIMAL_COMMA.fullmatch(word):
         meant = word.replace(",", ".")
-    right = describe_allowed(field) if what in _REASONS else ""
+    right = fields.describe_allowed(field) if what in _REASONS else ""
     if path[-1] in WORDS and what == "literal_error":
         right += advise_extensions()
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
@@ -259,15 +258,15 @@ def _is_later(place: Position, earlier: Position) -> bool:
 
 
 def _locate_key(
-    model: type[Block], location: Location, tree: BlockNode
-) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
+    model: type[fields.Block], location: Location, tree: BlockNode
+) -> tuple[list[str], FieldInfo | None, type[fields.Block] | None]:
     """Return the key and field at a location, and the type of block that the key holds in this tree.
 
     Parts of the location below the key (a list item, a kind of value) are ignored.
     """
     path: list[str] = []
     field: FieldInfo | None = None
-    block: type[Block] | None = model
+    block: type[fields.Block] | None = model
     for part in location:
         if isinstance(part, int) and block is not None:
             continue  # an item of a list of blocks
@@ -278,7 +277,7 @@ def _locate_key(
         node, _ = node_at(tree, tuple(path))
         chosen = node.entries.get("type") if isinstance(node, BlockNode) else None
         kind = str(chosen.value) if isinstance(chosen, Scalar) else ""
-        block = kinds_of(field).get(kind) or block_of(field)
+        block = fields.kinds_of(field).get(kind) or fields.block_of(field)
     return path, field, block
 
 
@@ -286,7 +285,7 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     above, field, inner = _locate_key(Config, location[:-1], tree)
     name = str(location[-1])
     block = inner or Config
-    kinds = {} if field is None else kinds_of(field)
+    kinds = {} if field is None else fields.kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
     assert isinstance(parent, BlockNode), "the parent holds the key"
     if any(name in kind.model_fields for kind in kinds.values()):
@@ -309,7 +308,7 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
 
 
 def _keys_of_another_kind(
-    above: str, entries: BlockNode, source: str, block: type[Block], kinds: dict[str, type[Block]]
+    above: str, entries: BlockNode, source: str, block: type[fields.Block], kinds: dict[str, type[fields.Block]]
 ) -> Problem:
     """Report all keys from one source that belong to another type of the block."""
     foreign_keys = {key for kind_block in kinds.values() for key in kind_block.model_fields} - {*block.model_fields}
@@ -330,7 +329,7 @@ def _keys_of_another_kind(
 
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
     """Return the path of the key with the nearest name (`exactly`: the same name) in any block, or an empty string."""
-    paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
+    paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last

@@ -14,15 +14,8 @@ from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo,
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
-from walkerlab.config.fields import Block, check_against, key, meaning_error
-from walkerlab.config.numbers import short_number
-from walkerlab.config.second_leg import (
-    KneelessLeg,
-    SecondCompassLeg,
-    SecondKneedLeg,
-    SecondStraightLeg,
-    lock_knee,
-)
+from walkerlab.config.fields import Block, check_against, key, meaning_error, short_number
+from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKneedLeg, SecondStraightLeg, lock_knee
 from walkerlab.errors import ConfigError
 from walkerlab.extensions import declared, load
 
@@ -292,10 +285,7 @@ class KneeJoint(Block):
         "ideal", "", "ideal: a plastic impact, then one body; compliant: a one-sided stop, then latched", HSU_CHEN
     )
     at_heel_strike: Literal["locked", "free"] = key(
-        "locked",
-        "",
-        "the trailing knee during the heel strike: locked and released just after it, or free",
-        HSU_CHEN,
+        "locked", "", "the trailing knee during the heel strike: locked and released just after it, or free", HSU_CHEN
     )
     release: Literal["compression", "touch"] = key(
         "compression",

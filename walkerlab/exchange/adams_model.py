@@ -4,8 +4,6 @@ The walk takes place in the x-y plane, x along the slope and y normal to it; gra
 Expressions name markers and variables in braces, as in DX({leg_1.foot}); each file format inserts its own names.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -21,9 +19,8 @@ from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.mechanics.parts import Position
-from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
-from walkerlab.scene.parts import knee_dampings
+from walkerlab.scene.parts import TORSO, knee_dampings
 
 MM = 1000.0
 GROUND = "ground"
@@ -236,7 +233,7 @@ class MovingFrame(NamedTuple):
     velocity: Position
     spin: float
 
-    def moved_to(self, point: Position) -> MovingFrame:
+    def moved_to(self, point: Position) -> "MovingFrame":
         """Return the parallel frame with its origin at a point of this frame."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]

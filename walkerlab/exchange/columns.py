@@ -1,7 +1,5 @@
 """Map the columns of a recording to quantities of a walk in SI units, by name, by suffix or as the user specifies."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Scene for other programs: a walker's parts, its start, and a linear approximation of its contact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,13 +8,11 @@ from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
-from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
-from walkerlab.physics.hybrid.contact_events import JudgedGround
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_mass
-from walkerlab.physics.mechanics.parts import Assembly, Knee
+from walkerlab.physics.hybrid.contact_state import JudgedGround
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_point, levers, masses, total_mass
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
@@ -56,7 +52,7 @@ class EngineScene:
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
-    def lock_knees(self, doing: NDArray[np.int8]) -> EngineScene:
+    def lock_knees(self, doing: NDArray[np.int8]) -> "EngineScene":
         """Return the scene with the knees in state LOCKED locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
@@ -97,7 +93,7 @@ class EngineScene:
         upward = s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
-    def scale_start(self, factor: float) -> EngineScene:
+    def scale_start(self, factor: float) -> "EngineScene":
         """Return the scene with the initial velocities multiplied by `factor`. The stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 from walkerlab.config.walkers import Kneed
 from walkerlab.errors import ConfigError
 from walkerlab.exchange import mjcf
-from walkerlab.exchange.adams import command_text, dataset_text
+from walkerlab.exchange.adams import command_text, dataset_text, view_text
 from walkerlab.exchange.adams_model import adams_model
-from walkerlab.exchange.adams_view import view_text
 from walkerlab.exchange.exported import Exported, GaitStart, prepare_export
 from walkerlab.exchange.mjcf import Slope
 from walkerlab.exchange.planar import SMALLEST_BALL_M

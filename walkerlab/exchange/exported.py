@@ -21,7 +21,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT, foothold_height
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import scene_on_pads, tolerances_of
-from walkerlab.scene.footholds import foothold_heights
+from walkerlab.scene.rigid import foothold_heights
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config

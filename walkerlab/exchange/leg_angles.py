@@ -3,8 +3,6 @@
 Each repair is listed in the doubts of the walk, with samples and times.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise

@@ -15,8 +15,6 @@ Source: MuJoCo documentation, Computation: constraint model, and Modeling: solve
 engine_setconst.c, function set0.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace

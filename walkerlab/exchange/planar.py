@@ -6,8 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from walkerlab.physics.mechanics.assembly import Anchor, followers, masses, neighbours
-from walkerlab.physics.mechanics.parts import Assembly, Knee, Position
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, Position, followers, masses, neighbours
 from walkerlab.physics.solvers.system import Floats
 
 Freedom = Literal["along", "height", "turn"]

@@ -4,8 +4,6 @@
 OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to quantities of a walk.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -29,7 +27,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.numbers import DECIMAL_COMMA
+from walkerlab.config.fields import DECIMAL_COMMA
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.units import UNIT_VALUES, is_unit
 

@@ -1,7 +1,5 @@
 """Interfaces through which stages and the runner report progress. Callers decide how to show it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -60,7 +58,7 @@ class Reporter(Protocol):
 class Silent:
     """Reporter that shows nothing."""
 
-    def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
+    def begin(self, stage: str, place: str, expected_s: float | None = None) -> "Silent":  # noqa: ARG002
         return self
 
     def note(self, *_arguments: Any, **_keywords: Any) -> None:

@@ -17,8 +17,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
-from walkerlab.physics.estimation.judgement import LIMP, alternates, judge
-from walkerlab.physics.estimation.measured_multipliers import measure_radius
+from walkerlab.physics.estimation.judgement import LIMP, alternates, judge, measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
@@ -44,7 +43,6 @@ from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import model_reads, scene_for, steps_of_stride
 from walkerlab.scene.parameter import (
     R,
     config_with,
@@ -54,7 +52,7 @@ from walkerlab.scene.parameter import (
     parameter_of,
 )
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait, model_reads, scene_for, steps_of_stride
 
 if TYPE_CHECKING:
     from walkerlab.config.identify import Identify

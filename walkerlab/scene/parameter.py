@@ -8,15 +8,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import (
-    Block,
-    annotation_of,
-    block_of,
-    describe_type,
-    leaves,
-    leaves_of_other_kinds,
-    value_at,
-)
+from walkerlab.config import fields
 from walkerlab.config.problems import nearest, printable
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
@@ -104,8 +96,8 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
     """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
-    value = value_at(config, path)
-    return value_at(config, first_leg_path(path)) if value is None else value
+    value = fields.value_at(config, path)
+    return fields.value_at(config, first_leg_path(path)) if value is None else value
 
 
 def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
@@ -115,12 +107,14 @@ def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
 
 def mass_of_second_leg(config: ContactConfig) -> str | None:
     """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
-    paths = (path for path, _ in leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg"))
+    paths = (
+        path for path, _ in fields.leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg")
+    )
     return next(map(".".join, paths), None)
 
 
 def _keys_set(value: Any) -> Any:
-    if not isinstance(value, Block):
+    if not isinstance(value, fields.Block):
         return value
     keys = value.model_dump(exclude_unset=True)
     # The type is needed even where it is a default, because it decides which keys a block has.
@@ -140,11 +134,11 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
-    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
-    reason = explain_non_parameter(key, config, fields, stated_value)
+    own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
+    reason = explain_non_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
-    unit = annotation_of(fields[key], "unit") or "1"
+    unit = fields.annotation_of(own[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
@@ -153,27 +147,27 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
-    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
+    own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in fields if not explain_non_parameter(key, config, fields))
+    yield from (written.get(key, key) for key in own if not explain_non_parameter(key, config, own))
 
 
 def explain_non_parameter(
-    key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = value_at
+    key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
     # `own` has the keys that exist for this config's type of walker
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"
-        foreign = {".".join(("walker", *path[1:])) for path, _ in leaves_of_other_kinds(Config)}
-        if key in foreign | {".".join(path) for path, _ in leaves(Config)}:
+        foreign = {".".join(("walker", *path[1:])) for path, _ in fields.leaves_of_other_kinds(Config)}
+        if key in foreign | {".".join(path) for path, _ in fields.leaves(Config)}:
             return f"is not a key of this walker, whose type is {config.walker.type}{suggest_key(key, own)}"
         return f"is not a key of the config{suggest_key(key, own)}"
     path = key.split(".")
     if path[0] not in MODEL_KEYS:
         return "affects no model"
-    if "number" not in describe_type(own[key].annotation):
+    if "number" not in fields.describe_type(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
         value = value_of(config, tuple(path[:depth]))
@@ -189,7 +183,9 @@ def suggest_key(key: str, own: Mapping[str, FieldInfo]) -> str:
     numbers = [
         name
         for name, field in own.items()
-        if name.split(".")[0] in MODEL_KEYS and block_of(field) is None and "number" in describe_type(field.annotation)
+        if name.split(".")[0] in MODEL_KEYS
+        and fields.block_of(field) is None
+        and "number" in fields.describe_type(field.annotation)
     ]
     closest = nearest(key, [*numbers, SLOPE_DEG])
     return f"; did you mean {closest}?" if closest else ""

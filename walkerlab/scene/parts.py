@@ -1,24 +1,108 @@
-"""Build the parts of a config's walker, shared by both models."""
+"""Build the parts of a config's walker, shared by both models: assemblies, from the dimensions of each type of walker.
 
-from typing import Any
+A body's frame has its origin at a hinge (the knee for a shank, otherwise the hip) and its y axis points up the body;
+"ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
+a leg's foot forward, so in a flexed knee the shank's angle is smaller than the thigh's.
+"""
 
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from walkerlab.config import walkers
 from walkerlab.config.drives import push_offs
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import (
-    LIGHTEST_CONTACT,
-    AssembledWalker,
-    CompassWalker,
-    Kneed,
-    StraightLegs,
-    second_leg_of,
-    torso_mass,
-)
 from walkerlab.errors import ConfigError
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
-from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, replace_second_leg, straight_legs
+
+LEG_NAMES = ("leg 1", "leg 2")
+THIGHS = ("thigh 1", "thigh 2")
+SHANKS = ("shank 1", "shank 2")
+TORSO = "torso"
+UPPER_END = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Limb:
+    """Rigid limb hanging from its upper end, SI."""
+
+    length_m: float
+    mass_kg: float
+    mass_below_m: float  # distance of the centre of mass below the upper end
+    mass_ahead_m: float = 0.0
+    inertia_kg_m2: float = 0.0  # about the limb's centre of mass
+
+    def body(self, name: str) -> Body:
+        return Body(name, self.mass_kg, (self.mass_ahead_m, -self.mass_below_m), self.inertia_kg_m2)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Circular sole, whose lowest point is level with the leg's lower end. A zero radius makes a point foot."""
+
+    radius_m: float = 0.0
+    centre_ahead_m: float = 0.0
+
+    def foot(self, body: str, length_m: float) -> BallFoot:
+        return BallFoot(f"foot of {body}", body, (self.centre_ahead_m, self.radius_m - length_m), self.radius_m)
+
+
+def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
+    return Assembly(
+        bodies=tuple(leg.body(name) for name in LEG_NAMES),
+        joints=(Revolute("hip", LEG_NAMES[1], UPPER_END, LEG_NAMES[0], UPPER_END),),
+        particles=(Particle("hip", hip_mass_kg, LEG_NAMES[1], UPPER_END),),
+        feet=tuple(foot.foot(name, leg.length_m) for name in LEG_NAMES),
+        legs=((LEG_NAMES[0],), (LEG_NAMES[1],)),
+    )
+
+
+def replace_second_leg(walker: Assembly, other: Assembly) -> Assembly:
+    """Return `walker` with the second leg of `other`. The hip mass is that of `walker`."""
+    legs = walker.legs[0], other.legs[1]
+    sources = (walker, legs[0]), (other, legs[1])
+    names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])
+    bodies = {body.name: body for source, leg in sources for body in source.bodies if body.name in leg}
+    # The hip joins bodies of both legs, so the hinges within one leg are knees.
+    knees = tuple(j for source, leg in sources for j in source.joints if {j.parent, j.child} <= {*leg})
+    return Assembly(
+        bodies=tuple(bodies[name] for name in names),
+        joints=(Revolute("hip", names[1], UPPER_END, names[0], UPPER_END), *knees),
+        particles=(Particle("hip", walker.particles[0].mass_kg, names[1], UPPER_END),),
+        feet=(walker.feet[0], other.feet[1]),
+        knees=tuple(knee for source, leg in sources for knee in source.knees if knee.shank in leg),
+        legs=legs,
+    )
+
+
+def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
+    at_knee = (0.0, -thigh.length_m)
+    knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], UPPER_END) for k in range(2))
+    return Assembly(
+        bodies=(*(thigh.body(name) for name in THIGHS), *(shank.body(name) for name in SHANKS)),
+        joints=(Revolute("hip", THIGHS[1], UPPER_END, THIGHS[0], UPPER_END), *knees),
+        particles=(Particle("hip", hip_mass_kg, THIGHS[1], UPPER_END),),
+        feet=tuple(foot.foot(name, shank.length_m) for name in SHANKS),
+        knees=tuple(Knee(f"knee {k + 1}", THIGHS[k], SHANKS[k]) for k in range(2)),
+        legs=((THIGHS[0], SHANKS[0]), (THIGHS[1], SHANKS[1])),
+    )
+
+
+def add_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
+    """Add a torso that is hinged at the hip and kept on the bisector of the legs.
+
+    Source: Wisse, Schwab, van der Helm, Passive dynamic walking model with upper body, Robotica 22 (2004).
+    """
+    upper = tuple(leg[0] for leg in walker.legs)
+    return replace(
+        walker,
+        bodies=(*walker.bodies, Body(TORSO, mass_kg, (0.0, above_hip_m), inertia_kg_m2)),
+        joints=(*walker.joints, Revolute("torso", upper[1], UPPER_END, TORSO, UPPER_END)),
+        couplings=(*walker.couplings, Coupling(TORSO, upper, (0.5, 0.5))),
+    )
+
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
-AnyWalker = CompassWalker | StraightLegs | Kneed | AssembledWalker
+AnyWalker = walkers.CompassWalker | walkers.StraightLegs | walkers.Kneed | walkers.AssembledWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
@@ -27,7 +111,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     Raises ConfigError for inconsistent parts.
     """
     parts = legs_of(walker, rigid)
-    other = second_leg_of(walker)
+    other = walkers.second_leg_of(walker)
     parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
@@ -35,14 +119,14 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
     """Return the parts of a walker without its torso and with two legs like leg 1."""
-    if isinstance(walker, CompassWalker):
+    if isinstance(walker, walkers.CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
-    if isinstance(walker, StraightLegs):
+    if isinstance(walker, walkers.StraightLegs):
         centre = walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    if isinstance(walker, Kneed):
+    if isinstance(walker, walkers.Kneed):
         upper = walker.thigh
         lower = walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
@@ -51,17 +135,17 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
     return described_parts(walker)
 
 
-def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
+def hip_mass(walker: walkers.CompassWalker | walkers.StraightLegs, rigid: bool) -> float:
     """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
     # On compliant ground, legs that are point masses need a hip mass. Without one, two legs side by side could turn
     # about their masses and move the hip freely, so that no force would determine the acceleration of the hip.
     if rigid:
         return walker.hip_mass_kg
-    present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
-    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
+    present = walkers.torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
+    return max(walker.hip_mass_kg, walkers.LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
-def described_parts(walker: AssembledWalker) -> Assembly:
+def described_parts(walker: walkers.AssembledWalker) -> Assembly:
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -76,22 +160,33 @@ def described_parts(walker: AssembledWalker) -> Assembly:
         raise ConfigError(f"walker: {error.args[0]}", PARTS_DOCS) from None
 
 
-def drive_parameters(config: RigidConfig) -> dict[str, Any]:
-    return {"hip": tuple(dict(config.walker.hip).values()), "push_off": max(push_offs(config.push_off))}
+class Drives(NamedTuple):
+    """Torques at hip and knees, and push-offs, as parameters of either model."""
+
+    hip: tuple[float, ...]
+    push_offs: tuple[float, float]  # N s, of each leg
+    knees: tuple[tuple[float, float, float], ...]  # of each leg; empty without dampers
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """Parameters of both legs together."""
+        return {"hip": self.hip, "push_off": max(self.push_offs)}
+
+
+def drive_parameters(config: RigidConfig) -> Drives:
+    dampings = knee_dampings(config.walker)
+    # a knee is only damped
+    knees = tuple((0.0, damping, 0.0) for damping in dampings) if any(dampings) else ()
+    return Drives(tuple(dict(config.walker.hip).values()), push_offs(config.push_off), knees)
 
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
     """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
-    knees = (getattr(each, "knee", None) for each in (walker, second_leg_of(walker)))
+    knees = (getattr(each, "knee", None) for each in (walker, walkers.second_leg_of(walker)))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second
 
 
-def damper(damping: float) -> tuple[float, float, float]:
-    """Return the parameters of a hinge that is only damped."""
-    return 0.0, damping, 0.0
-
-
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
     """Whether the trailing knee is rigid during heel strike."""
-    return not isinstance(walker, Kneed | AssembledWalker) or walker.knee.at_heel_strike == "locked"
+    return not isinstance(walker, walkers.Kneed | walkers.AssembledWalker) or walker.knee.at_heel_strike == "locked"

@@ -1,4 +1,4 @@
-"""Build the rigid model of a config, with only the parts that the config needs."""
+"""Build the rigid model of a config, with only the parts that the config needs, and the heights of its footholds."""
 
 from __future__ import annotations
 
@@ -7,30 +7,35 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from walkerlab.config.drives import push_offs
-from walkerlab.config.ground import Footholds
+import numpy as np
+
+from walkerlab.config.contact import Footholds
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
+from walkerlab.physics.hybrid.walk_record import rough_heights
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
-from walkerlab.physics.solvers.system import State
-from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.parts import (
-    PARTS_DOCS,
-    assembly_of,
-    damper,
-    drive_parameters,
-    knee_dampings,
-    knee_locked_at_strike,
-)
+from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene import parts
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations, Output
+
+
+def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
+    """Return the heights (steps + 1,) of the footholds in m above the slope, from the start on, or None if even."""
+    if ground.even:
+        return None
+    if ground.heights_m:
+        listed = np.array(ground.heights_m)[:steps]
+        return np.concatenate(([0.0], listed, np.full(steps - listed.size, ground.heights_m[-1])))
+    return rough_heights(ground.roughness_m, ground.seed, steps)
+
 
 FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 CACHED_LEVEL_WALKERS = 16  # families over slopes reuse their walkers on level ground
@@ -63,7 +68,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
-        knees_m=knee_positions(assembly_of(config.walker, rigid=True)),
+        knees_m=knee_positions(parts.assembly_of(config.walker, rigid=True)),
         outputs=outputs,
         ground=ground,
     )
@@ -77,18 +82,16 @@ def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Rig
 
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
     """Return the model with the push-off, hip spring and knee dampers of the config."""
-    driven = passive.changed(**drive_parameters(config))
-    dampings = knee_dampings(config.walker)
-    drives = [
-        {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
-        for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
+    drives = parts.drive_parameters(config)
+    driven = passive.changed(**drives.shared)
+    legs = [
+        {"push_off": push} | ({"knees": drives.knees[leg]} if drives.knees else {})
+        for leg, push in enumerate(drives.push_offs)
     ]
     # Equal drives leave equal legs a single model.
-    if drives[0] == drives[1]:
-        return driven.changed(**drives[0])
-    return pair(
-        *(replace_fields(model, drive) for model, drive in zip((driven, driven.exchanged), drives, strict=True))
-    )
+    if legs[0] == legs[1]:
+        return driven.changed(**legs[0])
+    return pair(*(replace_fields(model, leg) for model, leg in zip((driven, driven.exchanged), legs, strict=True)))
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
@@ -98,9 +101,11 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
     Raises ConfigError if the parts are not a valid walker.
     """
     try:
-        return rigid_on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
+        return rigid_on_level_ground(
+            parts.assembly_of(walker, rigid=True), gravity, parts.knee_locked_at_strike(walker)
+        )
     except ValueError as error:
-        raise ConfigError(f"walker: {error}", PARTS_DOCS) from None
+        raise ConfigError(f"walker: {error}", parts.PARTS_DOCS) from None
 
 
 def have_different_legs(config: RigidConfig) -> bool:
@@ -108,7 +113,7 @@ def have_different_legs(config: RigidConfig) -> bool:
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:
-    angles = tuple(f"theta_{name}" for name in group_bodies(assembly_of(config.walker, rigid=True)).names)
+    angles = tuple(f"theta_{name}" for name in group_bodies(parts.assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
 
 

@@ -1,16 +1,12 @@
 """Describe how walks ended, and whether the cause is the ground, such as its pads, rather than the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import Kneed
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
-
-if TYPE_CHECKING:
-    from walkerlab.config.reads import ContactConfig
 
 # Explanations of outcomes that the contact model's ground causes; pads are treated separately.
 GROUND_CAUSES: Final = {

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
+from walkerlab.evidence.benchmarks.engines.stage import supported_scene
 
 GAIT = (-0.2042004, 0.1694004, -0.605819, -0.861041)
 STEP_LENGTH = 0.3714

@@ -19,12 +19,20 @@ from walkerlab.evidence.benchmarks.accuracy import (
     omitted_tolerances,
     summarise,
 )
-from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, reference_for
-from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
+from walkerlab.evidence.benchmarks.trials import (
+    USER_SCRIPT,
+    End,
+    Reference,
+    RigidTrial,
+    TrialRun,
+    WalkEndsError,
+    first_end,
+    reference_for,
+)
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import rows_group
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.rigid import rigid_walker
 
 CONFIG = load(None, ("contact=null",)).config

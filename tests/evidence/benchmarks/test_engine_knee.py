@@ -5,14 +5,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
-from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
+from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES
 from walkerlab.exchange.planar import PINNED, planar_model
-from walkerlab.physics.mechanics.assembly import Anchor
+from walkerlab.physics.mechanics.parts import Anchor
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, Mode
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.physics.solvers.system import derivative
+from walkerlab.scene.parts import Arc, Limb, kneed_legs
 
 KNEED = kneed_legs(Limb(0.5, 0.5, 0.325, 0.01, 0.004), Limb(0.5, 0.05, 0.125, -0.01, 0.0008), 0.5, Arc())
 GRAVITY, SLOPE = 9.81, 0.0504

@@ -11,7 +11,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.engines.experiments import simulate
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.evidence.benchmarks.engines.runs import pinned_model
-from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
+from walkerlab.evidence.benchmarks.engines.stage import supported_scene
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.friction import friction_coefficient

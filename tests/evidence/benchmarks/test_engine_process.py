@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import pytest
 from crashing_tasks import Answers, Crashes, Raises, Sleeps
 
-from walkerlab.evidence.benchmarks.engines import process
+from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
-from walkerlab.evidence.benchmarks.engines.experiments import EngineExperiment
-from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
+from walkerlab.evidence.benchmarks.engines.experiments import EngineExperiment, OwnProcess, TaskLost
 
 
 @pytest.fixture
@@ -39,7 +38,7 @@ def test_endless_task_is_terminated(own, monkeypatch):
     lost = own.do(Sleeps().run, 0.2)
     assert isinstance(lost, TaskLost)
     assert lost.timed_out
-    monkeypatch.setattr(process, "START_UP_S", 30.0)
+    monkeypatch.setattr(experiments, "START_UP_S", 30.0)
     assert own.do(Answers(2).run, 1.0) == 2
 
 

@@ -7,13 +7,11 @@ from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
-from walkerlab.evidence.benchmarks.engines import registry
+from walkerlab.evidence.benchmarks import extension
 from walkerlab.evidence.benchmarks.engines import stage as engines
-from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene
-from walkerlab.evidence.benchmarks.engines.process import TaskLost
-from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engine
-from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
-from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
+from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene, TaskLost
+from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, supported_scene, three_digits
+from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES, Engine
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Silent
@@ -38,7 +36,7 @@ def test_without_engines_the_advice_is_to_install_the_extra(monkeypatch):
 
 def test_engine_version_changes_the_result_key(monkeypatch):
     config = load().config
-    monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
+    monkeypatch.setattr(extension, "installed", lambda: (ABSENT,))
     monkeypatch.setattr(Engine, "version", "1.0")
     before = Keys().identity(PIPELINE["engines"], config, {}).config_slice
     monkeypatch.setattr(Engine, "version", "1.1")

@@ -18,7 +18,7 @@ from walkerlab.evidence.verification.stability_maps import (
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.files import Checkpoint
 
 CELLS = 2
 

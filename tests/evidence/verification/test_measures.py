@@ -11,10 +11,9 @@ from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
 from walkerlab.evidence.paper.appendix_a import impact
 from walkerlab.evidence.paper.walker import compass
-from walkerlab.evidence.verification.catalogue import config_of, package_cases
+from walkerlab.evidence.verification.catalogue import config_of, package_cases, scaled, to_twin
 from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.momentum import RigidMasses, energy_won, feet_off_the_slope
-from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.starts import case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import Measure, finite
 from walkerlab.physics.hybrid.recorded_walk import take_walk

@@ -19,7 +19,7 @@ from walkerlab.physics.ground.walker import (
     to_full,
 )
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Revolute
-from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs
+from walkerlab.scene.parts import Arc, Limb, add_torso, kneed_legs
 
 LAW, FRICTION = Impact(4e5, 1.8, 300.0, 1e-3), Coulomb(0.9, 0.7, 0.01, 0.1)
 LEGS = kneed_legs(Limb(0.5, 0.8, 0.3, 0.02, 0.01), Limb(0.5, 0.3, 0.2, -0.03, 0.004), 0.7, Arc(0.2, 0.05))

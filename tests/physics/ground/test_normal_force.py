@@ -8,8 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
-from walkerlab.physics.ground.normal_force import Impact, elastic_energy, normal_force
-from walkerlab.physics.ground.smooth_step import smooth_step
+from walkerlab.physics.ground.normal_force import Impact, elastic_energy, normal_force, smooth_step
 
 laws = st.builds(
     Impact,

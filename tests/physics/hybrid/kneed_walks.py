@@ -7,9 +7,9 @@ from contact_walks import settings
 
 from walkerlab.config.contact import Contact
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
-from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs
+from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround
 from walkerlab.scene.contact import TERRAINS, ContactScene, ground_laws, start_state
+from walkerlab.scene.parts import Arc, Limb, kneed_legs
 
 THIGH, SHANK, HIP_MASS = Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5
 MASS, PAPER_MASS, GRAVITY, SLOPE = 1.6, 20.0, 9.81, 0.0504

@@ -7,8 +7,8 @@ import pytest
 from contact_walks import FIXED_POINT, RIGID_STEP, faster, scene_of, settings, walked
 
 from walkerlab.physics.ground.terrain import checkerboard
-from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import walk_contact
+from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.scene.contact import start_state
 
 

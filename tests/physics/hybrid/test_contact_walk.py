@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import feet_motion, place_on_ground
-from walkerlab.physics.hybrid.contact_events import farthest_slide
+from walkerlab.physics.hybrid.contact_state import farthest_slide
 from walkerlab.physics.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.scene.contact import start_state
 

@@ -33,11 +33,11 @@ from walkerlab.physics.ground.walker import LOCKED, RELEASED, STOPPING, feet_mot
 from walkerlab.physics.hybrid.contact_loop import walk_in_form
 from walkerlab.physics.hybrid.contact_result import losses_by_channel
 from walkerlab.physics.mechanics.parts import Assembly, Particle
-from walkerlab.physics.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.physics.orbits.contact_gait import find_gait_from, section_points
 from walkerlab.physics.orbits.contact_map import coordinates_of, state_on_section, step_from_section
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import start_state
+from walkerlab.scene.parts import Arc, Limb, straight_legs
 
 KNEE_STRIKE = 0.348612  # s after heel strike, of the rigid gait
 BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)

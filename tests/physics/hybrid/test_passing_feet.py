@@ -6,8 +6,7 @@ from contact_walks import scene_of
 
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import place_on_ground
-from walkerlab.physics.hybrid.contact_events import HEIGHT, PASSING, PER_FOOT
-from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.hybrid.contact_state import HEIGHT, PASSING, PER_FOOT, new_walk_state
 from walkerlab.physics.hybrid.contact_transitions import apply_event
 from walkerlab.physics.hybrid.endings import GOES_ON
 from walkerlab.scene.contact import start_state

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plain_rigid_walk import foot_of, plain_walk
 
-from walkerlab.config.ground import Footholds
+from walkerlab.config.contact import Footholds
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
@@ -15,8 +15,7 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, TANGENT_SCALE, RigidStepper, coordinates_of, strike_section
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import contact_scene, start_state
-from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import foothold_heights, rigid_walker
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-13, 10**7)
 ON_GROUND = Tolerances("radau5", 1e-8, 1e-10, 10**7)

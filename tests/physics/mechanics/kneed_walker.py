@@ -2,8 +2,7 @@
 
 import sympy as sp
 
-from walkerlab.physics.mechanics.assembly import Anchor
-from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Particle, Revolute
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, BallFoot, Body, Particle, Revolute
 
 RADIUS = 0.02
 # stance leg from its foot point up, torso from the hip up, thigh from the hip down, shank from the knee down; every

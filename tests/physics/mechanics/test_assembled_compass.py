@@ -15,7 +15,7 @@ from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Frictionless
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import place_on_ground
-from walkerlab.physics.mechanics.assembly import Anchor
+from walkerlab.physics.mechanics.parts import Anchor
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
 STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)

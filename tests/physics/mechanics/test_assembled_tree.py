@@ -14,8 +14,7 @@ from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
 from walkerlab.physics.ground.friction import Frictionless
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import place_on_ground
-from walkerlab.physics.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
-from walkerlab.physics.mechanics.parts import Assembly, Body, Revolute
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, Body, Revolute, levers, total_mass, tree_about_centre
 
 sp = import_late("sympy")
 kneed = import_late("kneed_walker")

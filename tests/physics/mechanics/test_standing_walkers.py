@@ -26,8 +26,8 @@ from walkerlab.physics.mechanics.rigid_model import (
     mode_jacobian,
     swing_foot,
 )
-from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, straight_legs
 from walkerlab.physics.solvers.system import derivative
+from walkerlab.scene.parts import Arc, Limb, add_torso, kneed_legs, straight_legs
 
 sp = import_late("sympy")
 

@@ -8,13 +8,13 @@ import pytest
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
-from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, straight_legs
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap, RigidStepper, state_on_section, strike_section
 from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.orbits.step_map import gait_near
 from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.scene.parts import Arc, Limb, add_torso, kneed_legs, straight_legs
 
 ROUND_FEET = straight_legs(Limb(0.4, 1.0, 0.1, 0.0, 0.01), 0.0, Arc(0.1))
 MCGEER = straight_legs(Limb(1.0, 1.0, 0.37, 0.0, 0.32**2), 0.0, Arc(0.3))

@@ -31,9 +31,9 @@ from walkerlab.physics.orbits.robustness import (
 from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.orbits.step_map import gait_near
 from walkerlab.scene.contact import gait_off_pads
-from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import contact_map, rigid_map
 
 
 def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from walkerlab.physics.kernels import kernel
-from walkerlab.physics.solvers.fused import fused
+from walkerlab.physics.solvers.lanes import fused
 
 numbers = st.floats(-1e6, 1e6)
 

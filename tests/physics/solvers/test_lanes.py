@@ -13,12 +13,12 @@ from walkerlab.physics.kernels import kernel
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, Mode
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers import system
-from walkerlab.physics.solvers.fused import fused
-from walkerlab.physics.solvers.lane_steps import derivative
 from walkerlab.physics.solvers.lanes import (
     WIDTH,
     any_positive,
     choose,
+    derivative,
+    fused,
     load_lanes,
     nearest,
     store_lanes,

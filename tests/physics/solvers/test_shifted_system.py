@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from walkerlab.physics.solvers.shifted_system import factor_shifted, solve_shifted, unknowns
+from walkerlab.physics.solvers.radau5 import factor_shifted, solve_shifted, unknowns
 
 entries = st.floats(-1e3, 1e3)
 shifts = st.one_of(st.floats(0.1, 1e4), st.builds(complex, st.floats(0.1, 1e4), st.floats(-1e4, 1e4)))

@@ -14,8 +14,8 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import basin, fixedpoint
 from walkerlab.pipeline.stages.basin import RigidQuestion
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.files import Checkpoint
 
 GAIT = {
     "state": [-0.2041996085033517, 0.1693996085033517, -0.605819000148935, -0.8610407199844384],

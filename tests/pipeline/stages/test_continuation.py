@@ -31,8 +31,8 @@ from walkerlab.pipeline.stages.continuation import (
     sample_again,
 )
 from walkerlab.pipeline.stages.family_groups import birth_of
-from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.subject import rigid_map
 
 
 def config(*sets):

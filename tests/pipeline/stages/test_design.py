@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import design, fixedpoint
-from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.contact import contact_scene, gait_off_pads, start_state
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import find_model_gait

@@ -16,7 +16,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, identify, simulate
 from walkerlab.pipeline.stages.measured_walk import NO_FILE, MeasuredFile, digests
 from walkerlab.views.cli.main import program
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.report.answers import answer
 from walkerlab.views.report.blocks import Player, Results
 from walkerlab.views.report.sections.identification import section

@@ -12,7 +12,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
-from walkerlab.pipeline.stages.numerical_error import LEAST_RTOL, change, tightened
+from walkerlab.pipeline.stages.walk import LEAST_RTOL, change, tightened
 from walkerlab.pipeline.store.content import Content
 
 # corrected equations, 0.0174 rad (fixed point of the paper's walker)

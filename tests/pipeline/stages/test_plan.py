@@ -13,7 +13,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, plan
 from walkerlab.views.cli.main import program
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.report.answers import answer
 from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections.identification import plan_section

@@ -16,8 +16,8 @@ from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, robustness
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import rows_group
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.views.report.answers import answer, further_tables
 from walkerlab.views.report.sections import robustness as robustness_section

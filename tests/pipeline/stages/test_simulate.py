@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.config.ground import Footholds
+from walkerlab.config.contact import Footholds
 from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from walkerlab.errors import StorageError
-from walkerlab.pipeline.store.checkpoint import Checkpoint, line
+from walkerlab.pipeline.store.files import Checkpoint, line
 
 NUMBERS = [0.1, math.pi, 1e-300, -0.0, 5e-324, 1.7976931348623157e308, 3.0]
 

@@ -12,13 +12,13 @@ from late_imports import import_late
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks.engines import registry
+from walkerlab.evidence.benchmarks import extension
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.planner import Planner
 from walkerlab.pipeline.plan.results import FolderResults, Keys, MemoryResults
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.stages.numerical_error import SAMPLE
+from walkerlab.pipeline.stages.walk import SAMPLE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import remove_timings
 from walkerlab.pipeline.store.files import refused
@@ -183,10 +183,10 @@ def test_point_has_the_key_of_its_single_run(name, tmp_path):
 
 def test_engine_version_changes_only_the_key_of_the_stage_engines(monkeypatch):
     config = load().config
-    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent"),))
+    monkeypatch.setattr(extension, "installed", lambda: (extension.Engine("absent", "absent"),))
     keys = []
     for version in ("1.0", "1.1"):
-        monkeypatch.setattr(registry.Engine, "version", version)
+        monkeypatch.setattr(extension.Engine, "version", version)
         keys.append(Keys().compute(config, "engines"))
     assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
 

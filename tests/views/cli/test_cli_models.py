@@ -6,7 +6,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.exchange.export import ENDINGS
 from walkerlab.views.cli import models
 from walkerlab.views.cli.console import Console
-from walkerlab.views.cli.target import Target
+from walkerlab.views.cli.exports import Target
 
 
 def test_exporting_a_model_without_a_run_computes_its_gait(walker):

@@ -7,8 +7,8 @@ from synthetic_walks import stored
 
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
-from walkerlab.physics.orbits.basin import UNREACHED
-from walkerlab.pipeline.stages.basin import WalkEnds, group_of, summary, window_of
+from walkerlab.physics.orbits.basin import UNREACHED, WalkEnds
+from walkerlab.pipeline.stages.basin import group_of, summary, window_of
 
 CONFIG = load(None, ["basin.cells=[4,3]"]).config
 Z = [0.17, -0.6, -0.86]

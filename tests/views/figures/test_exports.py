@@ -29,7 +29,7 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
 from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.figures.style import FIGURE_WIDTH
 from walkerlab.views.report.tex import escape_tex
 

@@ -21,7 +21,7 @@ from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.views.figures.canvas import figure_style, settle
 from walkerlab.views.figures.maps import ATTRACTOR_COLOURS
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.figures.style import CONTACT_LOOK, LEGS, POINT, RIGID_LOOK
 from walkerlab.views.report.tex import COLUMN_WIDTHS
 

@@ -20,7 +20,7 @@ from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures import stick_diagram, walks
 from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.illustration import WORDS, Illustration
-from walkerlab.views.figures.registry import FIGURES as ALL_FIGURES
+from walkerlab.views.figures.stage import FIGURES as ALL_FIGURES
 from walkerlab.views.figures.style import CONTACT_LOOK, RIGID_LOOK
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -146,7 +146,7 @@ OWN_SETTINGS = "font.size: 20\nlines.linewidth: 9\nsvg.fonttype: path\naxes.grid
 DRAW_ELSEWHERE = """
 import hashlib, sys
 from synthetic_methods import everything
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 results = everything()
 for figure in FIGURES:
     if figure.name in sys.argv:

@@ -10,7 +10,7 @@ from walkerlab.config.loader import load
 from walkerlab.evidence.paper.errata import Erratum
 from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.views.figures.registry import FIGURES
+from walkerlab.views.figures.stage import FIGURES
 
 sys.path.append(str(Path(__file__).parent.parent / "figures"))
 from real_results import first_steps

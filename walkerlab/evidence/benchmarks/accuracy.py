@@ -12,8 +12,19 @@ import numpy as np
 from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
-from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
-from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial, TrialRun
+from walkerlab.evidence.benchmarks.trials import (
+    USER_SCRIPT,
+    End,
+    Reference,
+    RigidTrial,
+    Trial,
+    TrialRun,
+    WalkEndsError,
+    contact_trial,
+    first_end,
+    second_end,
+    stiff_ground_trial,
+)
 from walkerlab.evidence.benchmarks.words import words
 from walkerlab.evidence.paper.walker import compass_or_none
 from walkerlab.labels import Label, labels_of
@@ -22,8 +33,8 @@ from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
-from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 from walkerlab.pipeline.store.content import Content, rows_group
+from walkerlab.pipeline.store.files import Checkpoint, Numbers
 from walkerlab.scene.rigid import rigid_walker
 
 # The sizes of runs below are counted in right-hand sides.
@@ -237,9 +248,6 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
     yield RigidTrial(walker, start, RIGID_TRIAL_STEPS, compass_or_none(config, config.equations))
     if config.contact is None:
         return
-    # contact code is loaded only for scenes that have contact
-    from walkerlab.evidence.benchmarks.contact_trials import contact_trial, stiff_ground_trial
-
     compass = is_passive_compass(config)
     steps = CONTACT_TRIAL_STEPS if compass else SLOW_CONTACT_STEPS
     yield contact_trial(config, state, length, steps, step_asymmetry(config, inputs))

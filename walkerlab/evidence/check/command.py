@@ -25,8 +25,7 @@ def check(
         typer.Argument(metavar="FILE...", help="Configs with a block `check`, or folders of such configs."),
     ] = None,
     state: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBERS", help="A printed state, in quotes, of the walker of --config."),
+        str | None, typer.Option(metavar="NUMBERS", help="A printed state, in quotes, of the walker of --config.")
     ] = None,
 ) -> None:
     """Check a printed gait: is it right, and if not, why?"""

@@ -19,8 +19,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.fields import replace_key
-from walkerlab.config.numbers import short_number
+from walkerlab.config.fields import replace_key, short_number
 from walkerlab.config.reads import RigidConfig, flatten
 from walkerlab.evidence.check.gaits import GRAVITIES, CheckedStep, Convention, alternatives, gait_near
 from walkerlab.evidence.check.plain_walker import (

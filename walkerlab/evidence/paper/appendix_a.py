@@ -14,8 +14,8 @@ from walkerlab.evidence.paper.law import as_printed
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
-from walkerlab.physics.mechanics.walkers import Arc, Limb, straight_legs
-from walkerlab.physics.solvers.fused import fused
+from walkerlab.physics.solvers.lanes import fused
+from walkerlab.scene.parts import Arc, Limb, straight_legs
 
 CORRECTED = -1.0
 AS_PRINTED = 1.0

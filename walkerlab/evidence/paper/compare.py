@@ -1,7 +1,5 @@
 """Stage `compare`: compare both models with each other and, for the paper's walker, with every number in the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

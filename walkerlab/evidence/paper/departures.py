@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from walkerlab.config.contact import BOUNDS_SI, Contact
 from walkerlab.config.drives import acting_on
-from walkerlab.config.numbers import are_equal
+from walkerlab.config.fields import are_equal
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import CompassWalker

@@ -1,7 +1,5 @@
 """Differences between two stored walks: in time, in phase, and between their orbits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

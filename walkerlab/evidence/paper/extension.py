@@ -1,7 +1,5 @@
 """The reproduced study as an extension: its stages, figures, sections, tables and equations."""
 
-from __future__ import annotations
-
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, Study, lazy_function
 from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, recording_options, results_of, walks_and

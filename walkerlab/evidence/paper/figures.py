@@ -1,7 +1,5 @@
 """Figures on the paper's claim: the difference between the walks of both models (8), and the rigid limit (12)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -10,21 +8,10 @@ import numpy as np
 
 from walkerlab.evidence.paper.printed import LARGEST_ERROR
 from walkerlab.labels import RIGID_STAGE
+from walkerlab.views.figures import walks
 from walkerlab.views.figures.canvas import add_legend, blank, cost_axis, entry, error_axis, label_of, power_of_ten
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RECORDED, RIGID_LOOK, VERMILLION, Look
-from walkerlab.views.figures.walks import (
-    COMPARE_STAGE,
-    NO_STATES,
-    STEPS_TAKEN_RIGID,
-    TUNE_STAGE,
-    claims_in,
-    first_strides,
-    line,
-    strike_entry,
-    time_axes,
-    walk_of,
-)
 
 TIME_LOOK: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1.4)), 1.2, "", order=3)
 PHASE_LOOK: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
@@ -33,14 +20,13 @@ AXIS_MARGIN = 3.0
 """Factor between the extreme errors and the ends of the axis."""
 ZERO_CROSSING = 1e-3
 """Smallest error shown, as a fraction of the largest; errors vanish where the difference changes sign."""
-LEG_QUANTITIES = (
-    ("a", "angle", "angle_error_rad"),
-    ("b", "angular velocity", "velocity_error_rad_s"),
-)
+LEG_QUANTITIES = (("a", "angle", "angle_error_rad"), ("b", "angular velocity", "velocity_error_rad_s"))
 """Compared quantities: panel letter, name, and error variable, which is stored as raw_NAME and as aligned_NAME."""
-RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), NO_STATES)
+RAW_ERRORS = Need(
+    walks.COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), walks.NO_STATES
+)
 ALIGNED_ERRORS = Need(
-    COMPARE_STAGE,
+    walks.COMPARE_STAGE,
     "aligned",
     ("phase", *(f"aligned_{name}" for _, _, name in LEG_QUANTITIES)),
     "no step was completed by both models",
@@ -49,29 +35,29 @@ ALIGNED_ERRORS = Need(
 
 def draw_differences(results: Results) -> Drawn:
     """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales."""
-    (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID_LOOK)])
-    raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
-    claimed = bool(claims_in(results))
+    (rigid,), _ = walks.first_strides([walks.walk_of(results[RIGID_STAGE], RIGID_LOOK)])
+    raw, aligned = (results[walks.COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
+    claimed = bool(walks.claims_in(results))
     early = raw["time"] <= rigid.time[-1]
-    recorded = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned")
+    recorded = results[walks.COMPARE_STAGE].groups.get("recorded/rigid/aligned")
     summary = {}
     recorded_look = RECORDED
     if recorded is not None:
-        summary = results[COMPARE_STAGE].summary["recorded"]
+        summary = results[walks.COMPARE_STAGE].summary["recorded"]
         recorded_look = replace(RECORDED, label=f"{summary['name']}, at the same phase")
-    figure, axes = time_axes(4, 1.55, [rigid])
+    figure, axes = walks.time_axes(4, 1.55, [rigid])
     rows = [(*quantity, leg) for quantity in LEG_QUANTITIES for leg in (0, 1)]
     for panel, (letter, words, name, leg) in zip(axes, rows, strict=True):
         raw_error = np.abs(raw[f"raw_{name}"][early, leg])
         aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
-        line(panel, raw["time"][early], raw_error, TIME_LOOK)
+        walks.line(panel, raw["time"][early], raw_error, TIME_LOOK)
         for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
-            line(panel, begin + (end - begin) * aligned["phase"], error, PHASE_LOOK)
+            walks.line(panel, begin + (end - begin) * aligned["phase"], error, PHASE_LOOK)
         errors = [raw_error, aligned_error]
         if recorded is not None:
             errors.append(np.abs(recorded[f"aligned_{name}"][: rigid.strikes.size, :, leg]))
             for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, errors[-1], strict=False):
-                line(panel, begin + (end - begin) * recorded["phase"], error, recorded_look)
+                walks.line(panel, begin + (end - begin) * recorded["phase"], error, recorded_look)
         largest = max(float(error.max()) for error in errors)
         bottom = ZERO_CROSSING * largest
         top = AXIS_MARGIN * largest
@@ -84,7 +70,7 @@ def draw_differences(results: Results) -> Drawn:
         panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         panel.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
     looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else []), *([] if recorded is None else [recorded_look])]
-    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
+    add_legend(figure, [*(entry(look.label, **look.line) for look in looks), walks.strike_entry(rigid.look)])
     caption_values = []
     for _, words, name in LEG_QUANTITIES:
         at_once = np.abs(raw[f"raw_{name}"]).max()
@@ -116,7 +102,9 @@ ERROR_LOOKS: Final = {
     "velocity_error_rad_s": Look("angular velocity in phase (rad/s)", ORANGE, "--", 1.4, "s"),
     NUMERICAL_ERROR: Look("numerical error, last touch (s)", GREY, "-.", 1.0, "x"),
 }
-LIMIT_NEED = Need(TUNE_STAGE, LIMITS[0][0], (RUN_TIME, *ERROR_LOOKS), "there is no gait to take to the rigid limit")
+LIMIT_NEED = Need(
+    walks.TUNE_STAGE, LIMITS[0][0], (RUN_TIME, *ERROR_LOOKS), "there is no gait to take to the rigid limit"
+)
 CLAIM_LINE: Final[dict[str, Any]] = {"color": BLACK, "linestyle": (0.0, (1.0, 2.0)), "linewidth": 1.0}
 CONFIG_MARKER: Final[dict[str, Any]] = {
     "color": BLACK,
@@ -132,9 +120,9 @@ MIN_ERROR = 1e-14
 def draw_limit(results: Results) -> Drawn:
     """Plot errors over run time, one point per setting, from the config's contact to the most rigid one."""
     figure = blank(3.6)
-    claimed = bool(claims_in(results))
+    claimed = bool(walks.claims_in(results))
     # the series with point feet is absent for walkers whose feet roll in both models
-    stored = results[TUNE_STAGE].groups
+    stored = results[walks.TUNE_STAGE].groups
     stored_series = [
         (stored[name], title) for name, title in LIMITS if name in stored and ALIGNED_ANGLE in stored[name].variables
     ]
@@ -157,11 +145,11 @@ def draw_limit(results: Results) -> Drawn:
     add_legend(figure, [*key, entry("the config's contact", **CONFIG_MARKER)])
     first, *point_feet = [rows[ALIGNED_ANGLE] for rows, _ in stored_series]
     claim = LARGEST_ERROR.text if claimed else ""
-    pushes = results[TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
+    pushes = results[walks.TUNE_STAGE].identity.config_slice["push_off"]["impulse_N_s"] != 0.0
     return figure, (first[0], first[-1], point_feet[0][-1] if point_feet else None, claim, pushes)
 
 
 FIGURES = (
-    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, STEPS_TAKEN_RIGID), draw_differences),
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, walks.STEPS_TAKEN_RIGID), draw_differences),
     paper_figure(12, (LIMIT_NEED,), draw_limit),
 )

@@ -5,7 +5,7 @@ Results with the equations as printed depend on this file, so the rest of the st
 
 from typing import Any
 
-from walkerlab.config.numbers import are_equal
+from walkerlab.config.fields import are_equal
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 

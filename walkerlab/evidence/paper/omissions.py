@@ -1,15 +1,9 @@
 """Parts of the paper's adjustment that do not apply to a config, known before anything is loaded or run."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.scene.omissions import Entry, omission
-
-if TYPE_CHECKING:
-    from walkerlab.config.reads import RigidConfig
 
 COMPASS_ONLY = "the paper uses it for its compass only"
 

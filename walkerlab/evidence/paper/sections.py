@@ -7,17 +7,8 @@ from typing import Any
 
 from walkerlab.evidence.check.section import TONES
 from walkerlab.labels import add_unit
+from walkerlab.views.report import blocks as page
 from walkerlab.views.report.answers import last_steps
-from walkerlab.views.report.blocks import (
-    PAPER_PAGE,
-    PageBlock,
-    Paragraph,
-    Results,
-    Section,
-    Shares,
-    Statement,
-    Statements,
-)
 from walkerlab.views.report.numbers import count, number, typeset
 from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import describe_error, words
@@ -30,17 +21,17 @@ MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact"
 """Headers of the columns that are compared with the paper's numbers, by key."""
 
 
-def numbers(results: Results) -> Section | None:
+def numbers(results: page.Results) -> page.Section | None:
     rows = compared(results, "paper_numbers")
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
     statements = tuple(
-        Statement(f"{spell_verdict(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings
+        page.Statement(f"{spell_verdict(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings
     )
     departs = words("paper.departs", results.departures) if results.departures else ""
-    blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
-    return Section.create("paper-numbers", "The paper’s numbers", blocks, finding(rows), PAPER_PAGE)
+    blocks = (page.Paragraph(departs, "fair"), page.Statements(statements, "lines"), numbers_table(rows))
+    return page.Section.create("paper-numbers", "The paper’s numbers", blocks, finding(rows), page.PAPER_PAGE)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
@@ -71,16 +62,16 @@ def name_with_unit(name: str, unit: str | None) -> str:
     return typeset(add_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
-def compared(results: Results, key: str) -> Sequence[Row]:
+def compared(results: page.Results, key: str) -> Sequence[Row]:
     """Return rows of the summary of `compare`, or no rows if it did not run or the walker is not the paper's."""
     rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
 
-def tables(results: Results) -> Section | None:
+def tables(results: page.Results) -> page.Section | None:
     summary = results.summary("compare")
     tables_shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
-    return Section.create("tables", "The paper’s tables", tables_shown, page=PAPER_PAGE)
+    return page.Section.create("tables", "The paper’s tables", tables_shown, page=page.PAPER_PAGE)
 
 
 def table_of(key: str, rows: Any) -> Table:
@@ -120,33 +111,35 @@ ERRATUM_COLUMNS = (
 )
 
 
-def errors(results: Results) -> Section | None:
+def errors(results: page.Results) -> page.Section | None:
     rows = compared(results, "errata")
     block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
     total = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
-    return Section.create("errata", "Errata of the paper", (block,), total, PAPER_PAGE)
+    return page.Section.create("errata", "Errata of the paper", (block,), total, page.PAPER_PAGE)
 
 
-def paper_section(results: Results) -> Section | None:
+def paper_section(results: page.Results) -> page.Section | None:
     """Summarise the verdicts on the paper's values and its most serious errors, or return None for any other scene."""
     rows = results.claims
     if not rows:
         return None
-    return Section("printed", "What the paper prints", tuple(list_verdicts(results, rows)), finding(rows))
+    return page.Section("printed", "What the paper prints", tuple(list_verdicts(results, rows)), finding(rows))
 
 
-def list_verdicts(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
+def list_verdicts(results: page.Results, rows: Sequence[Row]) -> Iterator[page.PageBlock]:
     """Yield the paper's values by verdict and location, and its most serious errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
-    yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
+    yield page.Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
     totals = Counter(row["where"] for row in rows)
     statements = (
-        Statement(f"{spell_verdict(name).capitalize()}:", words("verdict.places", counts, totals), tone=TONES[name])
+        page.Statement(
+            f"{spell_verdict(name).capitalize()}:", words("verdict.places", counts, totals), tone=TONES[name]
+        )
         for name, counts in places.items()
         if counts
     )
-    yield Statements(tuple(statements), "lines")
+    yield page.Statements(tuple(statements), "lines")
     headlines = words.terms("verdict.headlines").items()
     gravest = [
         (headline, erratum)
@@ -155,12 +148,12 @@ def list_verdicts(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
         if erratum["where"].startswith(place)
     ]
     if gravest:
-        yield Paragraph(words("verdict.reasons"))
+        yield page.Paragraph(words("verdict.reasons"))
         statements = (
-            Statement(typeset(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
+            page.Statement(typeset(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
             for headline, erratum in gravest
         )
-        yield Statements(tuple(statements), "columns")
+        yield page.Statements(tuple(statements), "columns")
 
 
 QUANTITIES_OF_TABLE_3 = {"t_left": "s", "t_right": "s", "t_cycle": "s", "v_com": "m/s", "E_avg": "J"}
@@ -171,12 +164,12 @@ RECORDED_COLUMNS = (
 )
 
 
-def recorded(results: Results) -> Section | None:
+def recorded(results: page.Results) -> page.Section | None:
     """Compare the recorded walk with both models, or return None if no walk was recorded."""
     stored = results.summary("compare").get("recorded")
     if stored is None:
         return None
-    return Section(
+    return page.Section(
         "recorded", f"The recorded walk {stored['name']}", tuple(recorded_tables(stored)), describe_recorded(stored)
     )
 

@@ -6,16 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walkerlab.evidence.paper import measured, printed
+from walkerlab.evidence.paper import measured, misprints, printed
 from walkerlab.evidence.paper.adams_start import AdamsStart, adams_start
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
-from walkerlab.evidence.paper.misprints import (
-    MISPRINTED,
-    fixed_point,
-    foothold_speed_after_impact,
-    height_over_slope,
-    inertia_at_impact,
-)
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.solvers.system import State
 
@@ -67,9 +60,9 @@ def study_the_paper() -> PaperStudy:
         five_steps_energy=five_steps.mean_energy,
         fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
-        swing_foot_height=height_over_slope(wrong, *x_p[:2], MISPRINTED),
-        foothold_speed=foothold_speed_after_impact(wrong, as_state(one_step.before[0]), MISPRINTED),
-        both_misprints=fixed_point(wrong, as_printed, MISPRINTED),
+        swing_foot_height=misprints.height_over_slope(wrong, *x_p[:2], misprints.MISPRINTED),
+        foothold_speed=misprints.foothold_speed_after_impact(wrong, as_state(one_step.before[0]), misprints.MISPRINTED),
+        both_misprints=misprints.fixed_point(wrong, as_printed, misprints.MISPRINTED),
         kinetic_energy=kinetic_energy_by_order(right),
         adams=adams_start(assembled(right._replace(slope=adams_slope)), printed.adams_start_as_printed()),
     )
@@ -86,7 +79,7 @@ def settle(walker: RigidWalker) -> State:
 def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
     """Return the kinetic energy (J) at x_p with a moving foot: from masses, and from D_e with angles or foot first."""
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
-    D = inertia_at_impact(walker, theta_1, theta_2)
+    D = misprints.inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
     foot_first = np.array([*FOOT_VELOCITY, omega_1, omega_2])
     L, a = walker.leg_length, walker.foot_to_mass

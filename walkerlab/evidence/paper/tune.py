@@ -30,28 +30,20 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
     TIME,
     count_outcomes,
     legs,
+    numerical_error,
     rigid_start,
     step_columns,
     summarise_walk,
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, real_and_imaginary, rows_group
-from walkerlab.scene.contact import (
-    SAMPLES_PER_PENDULUM_TIME,
-    ContactScene,
-    contact_gait,
-    require_contact,
-    scene_on_pads,
-    start_state,
-    tolerances_of,
-)
+from walkerlab.scene import contact
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
@@ -74,8 +66,8 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
     rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
-    gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
-    scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
+    gait = contact.contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
+    scene = replace(contact.scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     tune = TuneRun(config, scene, rigid_state, gait)
     tune.find(progress, jobs)
     stored = groups(tune)
@@ -100,14 +92,14 @@ class TuneRun:
     adjustment  smallest change of the velocities with which the contact model walks; None if it never walks
     """
 
-    def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
+    def __init__(self, config: TuneConfig, scene: contact.ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
         self.config = config
         self.scene = scene
         self.rigid_state = rigid_state
         self.gait = gait
         self.names = state_names(config)
         self.steps = 2 * config.strides
-        self.tolerances = tolerances_of(config, self.steps)
+        self.tolerances = contact.tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
         self.pins_foot = is_passive_compass(config)
         self.starts = build_scaled_starts(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
@@ -143,7 +135,7 @@ class TuneRun:
             self.adjusted_state = scale_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_own_walker(self.config):
-            terrain = require_contact(self.config).terrain
+            terrain = contact.require_contact(self.config).terrain
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
@@ -182,8 +174,8 @@ class TuneRun:
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
         """Simulate the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
-        interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
-        return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
+        interval = scene.ground.frame.pendulum_time / contact.SAMPLES_PER_PENDULUM_TIME
+        return scene.walk(contact.start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:
         """Take and record a walk of the procedure, with its numerical error unless the solver failed."""
@@ -204,7 +196,7 @@ def summary(tune: TuneRun) -> dict[str, Any]:
     paper = tune.paper
     pitch = tune.scene.pitch_m
     ends = count_outcomes(tune.contact_map.outcome)
-    pads = Pads((pitch, pitch), laid=str(require_contact(tune.config).pad_pitch))
+    pads = Pads((pitch, pitch), laid=str(contact.require_contact(tune.config).pad_pitch))
     return {
         "table2": table_2(tune),
         "gait": gait_summary(tune),
@@ -296,7 +288,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
     }
 
 
-def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
+def section_coordinates(scene: contact.ContactScene) -> list[tuple[str, str]]:
     """Return descriptions and units of a gait's coordinates on its section."""
     walker = scene.walker
     names = [body.name for body in scene.assembly.bodies]
@@ -407,7 +399,7 @@ def map_group(tune: TuneRun) -> Group:
     )
 
 
-def gait_group(gait: Cycle, scene: ContactScene) -> Group:
+def gait_group(gait: Cycle, scene: contact.ContactScene) -> Group:
     coordinates = section_coordinates(scene)
     names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
     units = ", ".join(unit for _, unit in coordinates)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations
 
 

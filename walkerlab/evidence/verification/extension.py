@@ -10,11 +10,10 @@ from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, gait_for_start_or_pad
 from walkerlab.scene.studies import is_studied
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import SceneConfig
     from walkerlab.config.schema import Config
 
 
-def cases_config(config: SceneConfig) -> type:
+def cases_config(config: reads.SceneConfig) -> type:
     """Return the type of config that `stability` takes. A study's walker needs less than a scene."""
     return reads.CompassCasesConfig if is_studied(config) else reads.SceneCasesConfig
 
@@ -23,12 +22,11 @@ def paper_walks(_config: object) -> dict[str, Any]:
     """Return the part of the paper's config that the cases depend on."""
     # imported here, because the command line's help does not need it
     from walkerlab.config.loader import paper_config_with
-    from walkerlab.config.reads import slice_of
 
-    return {"paper": slice_of(paper_config_with({}), reads.WalksConfig)}
+    return {"paper": reads.slice_of(paper_config_with({}), reads.WalksConfig)}
 
 
-def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
+def known_problems_and_start(config: reads.SceneConfig) -> tuple[str, ...]:
     """Require stage `known-problems` and, for a walker outside the studies, the stages of `gait_for_start_or_pads`."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from walkerlab.config.analyses import Case
 from walkerlab.config.schema import Config
-from walkerlab.evidence.verification.catalogue import config_of
+from walkerlab.evidence.verification.catalogue import config_of, scaled, to_twin
 from walkerlab.evidence.verification.ordinary import Choice, choices
-from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import (
     BUDGET_USED,

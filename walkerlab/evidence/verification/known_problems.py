@@ -21,10 +21,9 @@ from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import checkerboard
 from walkerlab.physics.ground.walker import ContactWalker, one_foot_motion
-from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.physics.hybrid.contact_result import new_observer, walk_on
-from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround, new_walk_state
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State

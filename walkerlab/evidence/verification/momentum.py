@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from walkerlab.config.analyses import Case
 from walkerlab.config.reads import RigidConfig, WalksConfig
-from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.catalogue import pendulum_time
 from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, allowed_difference, finite
 from walkerlab.physics.ground.friction import steepest_change
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import sample_feet
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
-from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, levers, masses
 from walkerlab.physics.mechanics.rigid import find_hip, group_bodies, have_equal_legs
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING
 from walkerlab.physics.solvers.registry import Tolerances

@@ -17,10 +17,10 @@ import numpy as np
 from walkerlab.config.analyses import Case
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.walkers import is_passive_compass
-from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
+from walkerlab.evidence.benchmarks.trials import walk_as_a_script
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.evidence.paper.walker import compass_or_none
-from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.catalogue import pendulum_time
 from walkerlab.evidence.verification.starts import ContactStart, RigidStart, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.ground.on_pads import OnPads

@@ -7,17 +7,7 @@ from typing import Any
 
 from walkerlab.evidence.verification.verdict import BUDGET_USED
 from walkerlab.outcome import outcome_of
-from walkerlab.views.report.blocks import (
-    CASES,
-    Gallery,
-    PageBlock,
-    Paragraph,
-    Results,
-    Section,
-    Statement,
-    Statements,
-    stage_section,
-)
+from walkerlab.views.report import blocks as page
 from walkerlab.views.report.numbers import format_integer, number
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.views.report.words import words
@@ -28,8 +18,8 @@ Row = Mapping[str, Any]
 Rows = Sequence[Row]
 
 
-@stage_section("stability")
-def section(results: Results, summary: Row) -> Section | None:
+@page.stage_section("stability")
+def section(results: page.Results, summary: Row) -> page.Section | None:
     """Build the section, or return None if the stage did not run."""
     cases = summary["cases"]
     problems = summary["known"]
@@ -39,18 +29,20 @@ def section(results: Results, summary: Row) -> Section | None:
     ]
     note = words("stability.cases", group_by_reason(unanswered), group_by_reason(unmeasured))
     planes = results.summary("stability-maps")
-    blocks: tuple[PageBlock, ...] = (
-        *(Paragraph(failure, "bad") for failure in failures(summary)),
-        Paragraph(words("stability.judgement")),
+    blocks: tuple[page.PageBlock, ...] = (
+        *(page.Paragraph(failure, "bad") for failure in failures(summary)),
+        page.Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
         table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, problems, wordy=True),
-        Paragraph("Not covered:"),
-        Statements(tuple(Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())),
+        page.Paragraph("Not covered:"),
+        page.Statements(
+            tuple(page.Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())
+        ),
         ordinary_table(summary),
-        Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
-        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
+        page.Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
+        *(page.Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
     )
-    return Section.create("stability", "Stiff and extreme cases", blocks, finding(summary), CASES)
+    return page.Section.create("stability", "Stiff and extreme cases", blocks, finding(summary), page.CASES)
 
 
 def finding(summary: Row) -> str:

@@ -1,10 +1,8 @@
 """Stage `stability`: extreme cases and known problems, judged by measures independent of the walk's computation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config, replace_state
@@ -19,9 +17,6 @@ from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.scene.contact import scene_on_pads
 from walkerlab.scene.omissions import Entry, omission
 from walkerlab.scene.studies import is_studied
-
-if TYPE_CHECKING:
-    from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig
 
 
 def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from walkerlab.config.analyses import Case
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import MidStep, state_of
+from walkerlab.evidence.verification.catalogue import pendulum_time
 from walkerlab.evidence.verification.momentum import (
     MEASURE,
     RigidMasses,
@@ -16,7 +17,6 @@ from walkerlab.evidence.verification.momentum import (
     feet_off_the_slope,
     momentum_finding,
 )
-from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.verdict import Measure, NotMeasured, finite
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.normal_force import elastic_energy

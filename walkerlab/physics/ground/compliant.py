@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import walkerlab.physics.ground.motion  # noqa: F401 (registers the equations of motion)
 from walkerlab.physics.ground.friction import FrictionLaw
@@ -13,17 +12,8 @@ from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.normal_force import Impact, NormalLaw
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import FIRST_KNEE, FORM, MAX_BODIES, NO_FOOT, ContactWalker
-from walkerlab.physics.mechanics.assembly import (
-    Anchor,
-    Tree,
-    followers,
-    levers,
-    reduction,
-    tree_about,
-    tree_about_centre,
-)
+from walkerlab.physics.mechanics import parts
 from walkerlab.physics.mechanics.hinges import HIP_ROW
-from walkerlab.physics.mechanics.parts import Assembly, Position
 from walkerlab.physics.solvers.system import Floats
 
 
@@ -39,13 +29,13 @@ class KneeRules:
 
 @dataclass(frozen=True)
 class Root:
-    tree: Tree
+    tree: parts.Tree
     constants: dict[str, Any]  # fields that have the same value in all forms with this root
     rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
 
 
 def contact_walker(
-    assembly: Assembly,
+    assembly: parts.Assembly,
     normal: NormalLaw,
     friction: FrictionLaw,
     gravity: float,
@@ -70,13 +60,13 @@ def contact_walker(
             # Bit k of a form's index says that knee k is locked, as in `locked_knees`.
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[pinned, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
-    legs = leg_bodies(assembly)
+    legs = parts.leg_bodies(assembly)
     # Merging bodies renumbers them, so the hip's two bodies are looked up in each form.
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
-def check_walkable(assembly: Assembly) -> None:
+def check_walkable(assembly: parts.Assembly) -> None:
     if len(assembly.bodies) > MAX_BODIES:
         raise ValueError(
             f"a walker on compliant ground has at most {MAX_BODIES} bodies; this assembly has {len(assembly.bodies)}"
@@ -87,19 +77,19 @@ def check_walkable(assembly: Assembly) -> None:
         raise ValueError(f"a walker has at most two knees; this assembly has {len(assembly.knees)}")
 
 
-def about_centre(assembly: Assembly) -> Root:
-    tree, feet = tree_about_centre(assembly)
-    hip = hip_levers(assembly, feet[0])
+def about_centre(assembly: parts.Assembly) -> Root:
+    tree, feet = parts.tree_about_centre(assembly)
+    hip = parts.hip_levers(assembly, feet[0])
     return Root(tree, {"places": 2, "pinned": NO_FOOT}, levers_by_axis(feet, hip))
 
 
-def about_foot(assembly: Assembly, foot: int) -> Root:
+def about_foot(assembly: parts.Assembly, foot: int) -> Root:
     ball = assembly.feet[foot]
-    tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
-    _, from_centre = tree_about_centre(assembly)
+    tree = parts.tree_about(assembly, parts.Anchor(ball.body, ball.centre_m))
+    _, from_centre = parts.tree_about_centre(assembly)
     # The levers between two points are the difference of their levers from a third, here the centre of mass.
     feet = [d - from_centre[foot] for d in from_centre]
-    hip = hip_levers(assembly, from_centre[0]) - from_centre[foot]
+    hip = parts.hip_levers(assembly, from_centre[0]) - from_centre[foot]
     return Root(tree, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
 
 
@@ -109,29 +99,7 @@ def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
     return {"foot_x": x, "foot_y": y, "hip_x": hip[:, 0], "hip_y": hip[:, 1]}
 
 
-def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Return the levers (bodies, 2) to the hip in m.
-
-    They start at the same point as `to_foot`, those to the first foot.
-    """
-    # Without named legs, the first foot takes the place of the hip.
-    if not all(assembly.legs):
-        return to_foot
-    upper = assembly.legs[STANCE_FOOT][0]
-    foot = assembly.feet[0]
-    hip = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
-    return to_foot + levers(assembly, Anchor(foot.body, foot.centre_m), hip)
-
-
-def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
-    """Return the point in a body's frame where it is hinged to another, or the origin if they are not
-    hinged directly.
-    """
-    hinge = assembly.hinge(body, other)
-    return (0.0, 0.0) if hinge is None else hinge.parent_point_m
-
-
-def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
+def fill(form: Any, assembly: parts.Assembly, root: Root, locked: list[int], merges: bool) -> None:
     """Fill a form with constants about a root. If `merges`, each knee in `locked` makes thigh and shank one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
@@ -141,7 +109,7 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     separate = [body for body in range(len(assembly.bodies)) if body not in one_with]
     onto = [separate.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
     S, n = np.eye(len(separate))[onto], len(separate)
-    rows = {onto[body]: row @ S for body, row in followers(assembly).items()}
+    rows = {onto[body]: row @ S for body, row in parts.followers(assembly).items()}
     rows |= {onto[shank]: np.eye(n)[onto[thigh]] for shank, thigh in straight.items() if shank not in one_with}
     rolling = np.zeros((2, len(onto)))
     for k, foot in enumerate(assembly.feet):
@@ -151,21 +119,14 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     merged = root.tree.merge_bodies(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
     form["mass"] = merged.pop("mass")
     # A form has room for MAX_BODIES; its constants fill the first entries of each axis.
-    for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
+    for name, value in (merged | {"E": parts.reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
         # A leg without a knee names its body twice, so its extension is always zero.
-        rigid = [onto[body] for body in leg_bodies(assembly)[len(knees) :, 0]]
+        rigid = [onto[body] for body in parts.leg_bodies(assembly)[len(knees) :, 0]]
         form["hinges"][FIRST_KNEE:] = [
             *((onto[shank], onto[thigh]) for thigh, shank in knees),
             *((leg, leg) for leg in rigid),
         ]
-
-
-def leg_bodies(assembly: Assembly) -> NDArray[np.int64]:
-    named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
-    most = max(map(len, named))
-    # a leg of fewer bodies repeats its last one
-    return np.array([[assembly.index(body) for body in (*leg, *leg[-1:] * (most - len(leg)))] for leg in named])

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from walkerlab.physics.ground.smooth_step import smooth_step
+from walkerlab.physics.ground.normal_force import smooth_step
 from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
 
 SLOPE_SAMPLES = 101  # slip velocities in each of the rising and the falling part
@@ -72,10 +72,7 @@ class Coulomb(NamedTuple):
     @classmethod
     def from_contact(cls, contact: Any) -> Coulomb:
         return cls(
-            contact.static_friction,
-            contact.dynamic_friction,
-            contact.stiction_velocity,
-            contact.friction_velocity,
+            contact.static_friction, contact.dynamic_friction, contact.stiction_velocity, contact.friction_velocity
         )
 
     @property

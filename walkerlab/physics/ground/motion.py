@@ -15,13 +15,14 @@ from walkerlab.physics.ground.walker import (
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.links import factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
     add_inertia,
     add_inertia_gradients,
+    factor_linked,
     projections,
+    solve_linked,
 )
 from walkerlab.physics.solvers.system import block, derivative, jacobian
 

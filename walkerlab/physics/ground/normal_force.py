@@ -10,8 +10,21 @@ import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
-from walkerlab.physics.ground.smooth_step import smooth_step
-from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
+from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default, kernel_part
+
+
+@kernel_part
+def smooth_step(x: float, x0: float, h0: float, x1: float, h1: float) -> tuple[float, float]:
+    """Evaluate STEP(x, x0, h0, x1, h1) and its derivative: h0 before x0, h1 after x1, a cubic in between.
+
+    Source: Adams function reference, STEP.
+    """
+    s = (x - x0) / (x1 - x0)
+    if s <= 0.0:
+        return h0, 0.0
+    if s >= 1.0:
+        return h1, 0.0
+    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s), 6.0 * (h1 - h0) * s * (1.0 - s) / (x1 - x0)
 
 
 class NormalLaw(Protocol):

@@ -25,13 +25,13 @@ Contact model (`contact_loop`)
 | file | content |
 |---|---|
 | `endings` | codes by which kernels of both models report the end of a walk |
-| `contact_events`, `contact_crossings` | the events; event functions along a step, and their first zero |
-| `contact_state` | the state of a walk besides coordinates: stance, contacts, signs of the event functions |
+| `contact_state` | the events; the state besides coordinates: stance, contacts, signs of the event functions |
+| `contact_crossings` | event functions along a step, and their first zero |
 | `contact_loop` | solver steps, and the search for the time of an event |
 | `contact_transitions`, `contact_jumps` | effects of events on the walk state, and on velocities, energy and tangent |
-| `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
+| `contact_record` | samples and energy balance; the derivative with respect to the start |
 | `contact_result` | a whole walk across changes of form, and its result |
 | `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
-| `walk_record`, `hip_work` | for both models: fields of every result; work of the hip torque |
+| `walk_record` | for both models: fields of every result; work of the hip torque |
 | `rigid_measures`, `comparison` | energies and forces along a rigid walk; differences between two walks |
 """

@@ -22,7 +22,8 @@ from walkerlab.physics.ground.walker import (
     relative_to_ground,
     sines_cosines,
 )
-from walkerlab.physics.hybrid.contact_events import (
+from walkerlab.physics.hybrid.contact_state import (
+    AT_COMPRESSION,
     EXTENSION,
     EXTENSION_RATE,
     FALL,
@@ -38,9 +39,10 @@ from walkerlab.physics.hybrid.contact_events import (
     RIGHT_EDGE,
     SLIDE,
     VERTICAL_VELOCITY,
+    WalkState,
     farthest_slide,
+    material_along,
 )
-from walkerlab.physics.hybrid.contact_state import AT_COMPRESSION, WalkState, material_along
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero

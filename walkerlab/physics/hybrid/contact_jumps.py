@@ -19,8 +19,8 @@ from walkerlab.physics.ground.walker import (
     to_form,
     to_full,
 )
-from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PASSING, PER_FOOT, PULSE_END
 from walkerlab.physics.hybrid.contact_record import ContactObserver
+from walkerlab.physics.hybrid.contact_state import EXTENSION, EXTENSION_RATE, HEIGHT, PASSING, PER_FOOT, PULSE_END
 from walkerlab.physics.kernels import vector
 from walkerlab.physics.mechanics.tree import projections
 from walkerlab.physics.solvers.events import shift_column

@@ -7,9 +7,17 @@ from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import OnGround, locked_knees
 from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
-from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, is_switching
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
-from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, has_not_lifted, is_above
+from walkerlab.physics.hybrid.contact_state import (
+    AT_PULSE_END,
+    NO_EVENT,
+    PASSING,
+    PULSE_END,
+    WalkState,
+    has_not_lifted,
+    is_above,
+    is_switching,
+)
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
 from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
@@ -66,12 +74,7 @@ class EventSearch(NamedTuple):
 
 @kernel
 def walk_in_form(
-    system: OnGround,
-    method: Any,
-    finder: CrossingFinder,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    until: int,
+    system: OnGround, method: Any, finder: CrossingFinder, observer: ContactObserver, walk_state: WalkState, until: int
 ) -> tuple[int, int]:
     """Walk until the steps fill `walk_state`, the walker changes its form, a pinned step is complete, or the walk ends.
 

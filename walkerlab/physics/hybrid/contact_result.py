@@ -25,12 +25,19 @@ from walkerlab.physics.ground.walker import (
     to_full,
 )
 from walkerlab.physics.hybrid.contact_crossings import hip_height
-from walkerlab.physics.hybrid.contact_events import EVENT_ROWS, HEIGHT, PER_FOOT, JudgedGround
 from walkerlab.physics.hybrid.contact_jumps import change_form
 from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
-from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples
-from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state, steps_with_lift
-from walkerlab.physics.hybrid.contact_tangent import new_tangent
+from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples, new_tangent
+from walkerlab.physics.hybrid.contact_state import (
+    EVENT_ROWS,
+    HEIGHT,
+    PER_FOOT,
+    JudgedGround,
+    WalkState,
+    material_along,
+    new_walk_state,
+    steps_with_lift,
+)
 from walkerlab.physics.hybrid.endings import CHANGES_FORM, FALLEN_HIP
 from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import kernel, uncompiled, vector

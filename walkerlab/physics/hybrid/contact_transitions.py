@@ -22,25 +22,23 @@ from walkerlab.physics.ground.walker import (
     feet_motion,
     relative_to_ground,
 )
-from walkerlab.physics.hybrid.contact_events import (
+from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
+from walkerlab.physics.hybrid.contact_state import (
+    AT_COMPRESSION,
+    AT_PULSE_END,
     EXTENSION,
     EXTENSION_RATE,
     FALL,
     HEIGHT,
     LEFT_EDGE,
+    NOT_DUE,
     PASSING,
     PER_FOOT,
     RIGHT_EDGE,
     SLIDE,
     VERTICAL_VELOCITY,
-    farthest_slide,
-)
-from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
-from walkerlab.physics.hybrid.contact_state import (
-    AT_COMPRESSION,
-    AT_PULSE_END,
-    NOT_DUE,
     WalkState,
+    farthest_slide,
     is_above,
     is_ahead,
     material_along,

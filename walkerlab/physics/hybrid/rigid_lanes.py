@@ -20,14 +20,23 @@ from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, RigidModel, feet_
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
-from walkerlab.physics.solvers.hermite import Jet, Quintic, evaluate_quintic, first_fall, hermite
-from walkerlab.physics.solvers.lane_steps import LANE_ERROR_3, LANE_ERROR_5, combine, derivative, error_sums, run_stages
 from walkerlab.physics.solvers.lanes import (
+    LANE_ERROR_3,
+    LANE_ERROR_5,
     WIDTH,
+    Jet,
     Lanes,
+    Quintic,
     any_positive,
     choose,
+    combine,
+    derivative,
+    error_sums,
+    evaluate_quintic,
+    first_fall,
+    hermite,
     load_lanes,
+    run_stages,
     store_lanes,
     teach_arithmetic,
 )
@@ -145,7 +154,7 @@ class LaneMemory(NamedTuple):
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
     teach_arithmetic()
-    # A finder of degree 5 fits the quintics of hermite.py.
+    # A finder of degree 5 fits the quintics of lanes.py.
     return LaneMemory(
         rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )

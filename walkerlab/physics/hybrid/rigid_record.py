@@ -4,18 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.hybrid.hip_work import torque_work
+from walkerlab.physics.hybrid.walk_record import torque_work
 from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.impact import push_off
-from walkerlab.physics.mechanics.rigid_model import (
-    Mode,
-    RigidModel,
-    energies,
-    ground_reaction,
-    momentum,
-    swing_foot,
-)
+from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel, energies, ground_reaction, momentum, swing_foot
 from walkerlab.physics.mechanics.tree import fast_fields, new_record, record_type
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample

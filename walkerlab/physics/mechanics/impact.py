@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.links import factor_linked, solve_linked
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,
     BENT,
@@ -26,7 +25,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     equations,
     hip_height,
 )
-from walkerlab.physics.mechanics.tree import add_inertia, projections, sines_cosines
+from walkerlab.physics.mechanics.tree import add_inertia, factor_linked, projections, sines_cosines, solve_linked
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats
 
@@ -39,7 +38,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     the model of the swing that ends, `model` that of the next one. Any number of variational columns may follow the
     state; they are also mapped and written into `new`.
     """
-    # E[phase] makes bodies follow others, such as a locked shank its thigh (see links.py).
+    # E[phase] makes bodies follow others, such as a locked shank its thigh (see tree.py).
     like = model.arm_x
     other_foot = phase == AT_STRIKE
     n = len(like)
@@ -241,7 +240,7 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
 class Constraints(NamedTuple):
     """Constraints of an impact, with the mass matrix and moments of the tree about its new root."""
 
-    E: Any  # (n, n) reduction of links.py
+    E: Any  # (n, n) reduction of tree.py
     M: Any  # (n, n) kg m^2
     factors: Any  # (n, n) factors from `factor_linked`
     F: Any  # (n,) kg m, first moments projected on the slope

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from walkerlab.physics.mechanics.assembly import Anchor, followers, levers, reduction, tree_about
-from walkerlab.physics.mechanics.parts import Assembly, Position, Revolute
+from walkerlab.physics.mechanics import parts
 from walkerlab.physics.mechanics.rigid_model import (
     NO_SHANK,
     STANCE,
@@ -33,12 +32,14 @@ class BodyGroups:
     lower: int  # number of bodies of the swing leg below its uppermost one; for unequal legs, the larger number
 
 
-def rigid_on_slope(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
+def rigid_on_slope(
+    assembly: parts.Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True
+) -> RigidModel:
     """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `rigid_on_level_ground`."""
     return change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
-def rigid_on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def rigid_on_level_ground(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """Build the rigid model of an assembly, which is a pair of models if the legs differ. Gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
@@ -59,21 +60,21 @@ def rigid_on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_str
     return pair(models[0].changed(leg_length=models[1].leg_length), models[1])
 
 
-def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def swinging_first(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
     hip = find_hip(assembly)
     groups = group_bodies(assembly)
     swing_foot, foot = assembly.feet
-    swing_root, root = (Anchor(each.body, each.centre_m) for each in assembly.feet)
-    to_foot = groups.members.T @ levers(assembly, root, swing_root)
+    swing_root, root = (parts.Anchor(each.body, each.centre_m) for each in assembly.feet)
+    to_foot = groups.members.T @ parts.levers(assembly, root, swing_root)
     # for straight legs, measured from the centre of each foot's arc
-    to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m)).sum(axis=0)
-    swing_to_hip = levers(assembly, swing_root, Anchor(hip.child, hip.child_point_m)).sum(axis=0)
+    to_hip = parts.levers(assembly, root, parts.Anchor(hip.parent, hip.parent_point_m)).sum(axis=0)
+    swing_to_hip = parts.levers(assembly, swing_root, parts.Anchor(hip.child, hip.child_point_m)).sum(axis=0)
     soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
     n = len(groups.names)
     members = groups.members
     # Each body belongs to one group, whose index is that of the only 1 in its row.
-    coupled = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
+    coupled = {int(np.argmax(members[body])): row @ members for body, row in parts.followers(assembly).items()}
     knees = {shank: np.eye(n)[thigh] for shank, thigh in groups.knees}
     # If only the other leg has a knee, this leg still has an index for a shank, which stays in line with the leg.
     coupled |= {body: np.eye(n)[SWING] for body in range(n) if not members[:, body].any()}
@@ -83,11 +84,11 @@ def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bo
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**coupled, **knees}
     # in the order BENT, STRAIGHT, AT_STRIKE
-    reductions = [reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
+    reductions = [parts.reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
     shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
     return new_rigid_model(
         n,
-        **tree_about(assembly, root).merge_bodies(members),
+        **parts.tree_about(assembly, root).merge_bodies(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,
@@ -111,7 +112,7 @@ def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bo
     )
 
 
-def group_bodies(assembly: Assembly) -> BodyGroups:
+def group_bodies(assembly: parts.Assembly) -> BodyGroups:
     """Group the bodies in the model's order: swing leg (or thigh), straight stance leg, swing shank, shared bodies."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
@@ -137,7 +138,7 @@ def group_index(groups: list[tuple[str, ...]], name: str) -> int:
     return next(index for index, group in enumerate(groups) if name in group)
 
 
-def find_hip(assembly: Assembly) -> Revolute:
+def find_hip(assembly: parts.Assembly) -> parts.Revolute:
     """Return the hinge between the legs, with the stance leg as its parent."""
     first, second = (leg[0] for leg in assembly.legs)
     hinge = assembly.hinge(second, first)
@@ -146,7 +147,7 @@ def find_hip(assembly: Assembly) -> Revolute:
     return hinge
 
 
-def knee_positions(assembly: Assembly) -> tuple[Position, ...]:
+def knee_positions(assembly: parts.Assembly) -> tuple[parts.Position, ...]:
     """Return the position (m) of each leg's knee in the frame of its thigh, or () for a walker without knees."""
     # The line of a leg without a knee is drawn through the point where the other leg has one.
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
@@ -154,7 +155,7 @@ def knee_positions(assembly: Assembly) -> tuple[Position, ...]:
     return (positions * 2)[:2]
 
 
-def check_legs(assembly: Assembly) -> None:
+def check_legs(assembly: parts.Assembly) -> None:
     first, second = assembly.legs
     if not first or not second:
         raise ValueError("both legs need bodies, listed from the hip down: legs: [[…], […]]")
@@ -178,7 +179,7 @@ def check_legs(assembly: Assembly) -> None:
             raise ValueError(f"body {body.name!r} is in neither leg and has no coupling")
 
 
-def have_equal_legs(assembly: Assembly) -> bool:
+def have_equal_legs(assembly: parts.Assembly) -> bool:
     """Whether both legs of an assembly have the same dimensions and masses."""
     first, second = assembly.legs
     return len(first) == len(second) and all(map(are_equal, *(leg_measures(assembly, k) for k in range(2))))
@@ -188,14 +189,14 @@ def are_equal(one: Floats, other: Floats) -> bool:
     return bool(np.allclose(one, other, rtol=SYMMETRY_TOLERANCE, atol=SYMMETRY_TOLERANCE * np.abs(one).max()))
 
 
-def leg_measures(assembly: Assembly, k: int) -> tuple[Floats, ...]:
+def leg_measures(assembly: parts.Assembly, k: int) -> tuple[Floats, ...]:
     """Return the sole of a leg, and the constants of its bodies about the hip, which do not depend on the hip mass."""
     leg = assembly.legs[k]
     foot = assembly.feet[k]
     hip = find_hip(assembly)
-    at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
+    at_hip = parts.Anchor(hip.parent, hip.parent_point_m) if k == 1 else parts.Anchor(hip.child, hip.child_point_m)
     bodies = [assembly.index(name) for name in leg]
-    sole = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[bodies].ravel()]
-    tree = tree_about(assembly, at_hip)
+    sole = [foot.radius_m, *parts.levers(assembly, at_hip, parts.Anchor(foot.body, foot.centre_m))[bodies].ravel()]
+    tree = parts.tree_about(assembly, at_hip)
     pairs, arms = (np.stack(each)[..., bodies] for each in ((tree.A, tree.B), (tree.arm_x, tree.arm_y)))
     return np.array(sole), pairs[:, bodies], arms

@@ -7,7 +7,7 @@ is a hinge. With M, r, F and U of tree.py, Kronecker's delta d and the index s o
     r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
 
 Body 0 is the swing leg (or its thigh), body 1 the straight stance leg; then come the swing leg's shank and the bodies
-that both legs share. Bodies that follow others are eliminated as in links.py.
+that both legs share. Bodies that follow others are eliminated as in tree.py.
 """
 
 import math
@@ -29,15 +29,17 @@ from walkerlab.physics.mechanics.hinges import (
     is_sprung,
     legs_apart,
 )
-from walkerlab.physics.mechanics.links import expand, factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
     add_inertia,
     add_inertia_gradients,
+    expand,
+    factor_linked,
     lever_motion,
     projections,
     sines_cosines,
+    solve_linked,
 )
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian

@@ -11,6 +11,14 @@ rolling foot in rigid_model.py, Newton's law for the centre of mass in ground/mo
 
 In the functions, `tree` is a Mechanism with n bodies: a `RigidModel`, or a `GroundModel` on compliant ground. The
 compiler knows n if the tree's type fixes it.
+
+Some bodies follow others: a locked shank follows its thigh, a torso the bisector of the legs.
+
+If the angles are theta = E z with a constant E, then M alpha = r becomes E^T M E dz = E^T r, where dz holds the
+accelerations of z. The system keeps its size: a follower's row and column are added to those of the bodies that it
+follows, and its own equation becomes trivial. A follower's row of E (n, n) holds its weights, with zero on the
+diagonal; all other rows are those of the unit matrix. A model has an E for each phase. If the model's type fixes n, the
+compiler unrolls the loops below, which then take little more than half the time.
 """
 
 from collections.abc import Mapping
@@ -60,11 +68,11 @@ def new_record(kind: Any, **fields: Any) -> Any:
 class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Constants (SI) of a tree of n bodies about its root, of its hinges and of the forces on it, for both models."""
 
-    A: Floats  # (n, n) kg m^2, as defined in mechanics/assembly.py
+    A: Floats  # (n, n) kg m^2, as defined in mechanics/parts.py
     B: Floats  # (n, n) kg m^2
     arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
-    E: Floats  # (phases, n, n) reductions of links.py; a body that follows others has zero on the diagonal
+    E: Floats  # (phases, n, n) reductions; a body that follows others has zero on the diagonal
     hinges: Integers  # (rows, 2) bodies at each hinge: its torque turns the first back and the second forward
     laws: Floats  # (rows, LAW_NUMBERS) parameters of the SpringDamper at each hinge
     push_off: float  # N s, impulse along the trailing leg: instantaneous, or a pulse that starts at the touch
@@ -206,3 +214,56 @@ def potential_energy(tree: Any, n: int, along: float, height: float, F: Any, U: 
     for k in range(n):
         total += tree.gravity_down * U[k] - tree.gravity_along * F[k]
     return total
+
+
+@forced_inline
+def expand(E: Any, n: int, z: Any) -> None:
+    """Replace z (n,) by E z: compute each follower's value from those of the bodies it follows."""
+    for c in range(n):
+        if E[c, c] == 0.0:
+            total = 0.0
+            for p in range(n):
+                total += E[c, p] * z[p]
+            z[c] = total
+
+
+@forced_inline
+def factor_linked(E: Any, n: int, M: Any) -> None:
+    """Replace M (n, n) by the factors of E^T M E = L D L^T: 1/D on the diagonal, L^T above it."""
+    for c in range(n):
+        if E[c, c] == 0.0:
+            for p in range(n):
+                for l in range(n):
+                    M[p, l] += E[c, p] * M[c, l]
+            for p in range(n):
+                for l in range(n):
+                    M[l, p] += E[c, p] * M[l, c]
+            for l in range(n):
+                M[c, l], M[l, c] = 0.0, 0.0
+            M[c, c] = 1.0
+    # M is positive definite, so no row exchanges are needed.
+    for k in range(n):
+        M[k, k] = 1.0 / M[k, k]
+        for i in range(k + 1, n):
+            M[k, i] = M[i, k] * M[k, k]
+            for j in range(k + 1, i + 1):
+                M[i, j] -= M[k, i] * M[j, k]
+
+
+@forced_inline
+def solve_linked(E: Any, n: int, factors: Any, b: Any) -> None:
+    """Replace the right-hand side r in b (n,) by the solution E dz, using the factors from `factor_linked`."""
+    # A torque on a follower acts on the bodies it follows.
+    for c in range(n):
+        if E[c, c] == 0.0:
+            for p in range(n):
+                b[p] += E[c, p] * b[c]
+            b[c] = 0.0
+    for k in range(n):
+        for i in range(k + 1, n):
+            b[i] -= factors[k, i] * b[k]
+    for k in range(n - 1, -1, -1):
+        b[k] *= factors[k, k]
+        for j in range(k + 1, n):
+            b[k] -= factors[k, j] * b[j]
+    expand(E, n, b)

@@ -3,8 +3,7 @@
 import math
 
 from walkerlab.physics.kernels import PART_FLAGS, compile_as, kernel_part
-from walkerlab.physics.solvers.fused import fused
-from walkerlab.physics.solvers.lanes import Lanes, any_positive, holds_lanes, nearest
+from walkerlab.physics.solvers.lanes import Lanes, any_positive, fused, holds_lanes, nearest
 
 QUARTER_PI = 0.7853981633974483
 PER_PI = 0.3183098861837907

@@ -13,9 +13,8 @@ import numpy as np
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.physics.hybrid.contact_result import new_observer, walk_on
-from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.hybrid.contact_state import PASSING, JudgedGround, new_walk_state
 from walkerlab.physics.orbits.contact_map import AdaptivePads, coordinates_of
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides
 from walkerlab.physics.orbits.newton import Effort, NotConverged

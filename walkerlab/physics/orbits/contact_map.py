@@ -32,14 +32,12 @@ from walkerlab.physics.ground.walker import (
     to_form,
     to_full,
 )
-from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.physics.hybrid.contact_jumps import state_rate
 from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_observer, present_walker, walk_on
-from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state
+from walkerlab.physics.hybrid.contact_state import PASSING, JudgedGround, WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
-from walkerlab.physics.mechanics.links import factor_linked, solve_linked
-from walkerlab.physics.mechanics.tree import add_inertia
+from walkerlab.physics.mechanics.tree import add_inertia, factor_linked, solve_linked
 from walkerlab.physics.orbits.step_map import (
     CACHE_SIZE,
     Cycle,

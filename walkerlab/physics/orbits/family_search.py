@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from walkerlab.physics.orbits import two_parameters
 from walkerlab.physics.orbits.attractors import (
     Attractor,
     AttractorBranch,
@@ -20,14 +21,6 @@ from walkerlab.physics.orbits.attractors import (
 from walkerlab.physics.orbits.continuation import StepControl
 from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.physics.orbits.step_map import StepMap
-from walkerlab.physics.orbits.two_parameters import (
-    CURVE_CONTROL,
-    BifurcationCurve,
-    Plane,
-    Regions,
-    find_regions,
-    follow_curve,
-)
 from walkerlab.physics.solvers.system import Floats
 
 BEFORE_FLIP = 0.02  # the attractor is followed from this far before the first flip, as a fraction of the span
@@ -74,7 +67,7 @@ THOROUGHNESS = {
         exponents=16,
         averaged=1500,
         branch_control=StepControl(),
-        curve_control=CURVE_CONTROL,
+        curve_control=two_parameters.CURVE_CONTROL,
         periods=64,
         curve_periods=4,
         other_gaits=True,
@@ -104,8 +97,8 @@ class Family:
     branches: tuple[GaitBranch, ...] = ()
     attractors: AttractorBranch = field(default_factory=AttractorBranch)
     exponents: tuple[Lyapunov, ...] = ()
-    curves: tuple[BifurcationCurve, ...] = ()  # bifurcation curves over the plane of two parameters
-    regions: Regions | None = None  # periods of attractors over that plane
+    curves: tuple[two_parameters.BifurcationCurve, ...] = ()  # bifurcation curves over the plane of two parameters
+    regions: two_parameters.Regions | None = None  # periods of attractors over that plane
 
 
 @dataclass(frozen=True)
@@ -119,7 +112,7 @@ class FamilySearch:
     periods: int
     points: int
     listener: Listener
-    plane: Plane | None = None
+    plane: two_parameters.Plane | None = None
 
     @property
     def thoroughness(self) -> Thoroughness:
@@ -223,13 +216,15 @@ class FamilySearch:
         self.announce("branches of other gaits of {model}")
         return replace(family, branches=self.follower.family(seeds, self.periods, family.branches))
 
-    def add_plane(self, family: Family, plane: Plane) -> Family:
+    def add_plane(self, family: Family, plane: two_parameters.Plane) -> Family:
         span = self.span
         advance = self.listener.advance
         how = self.thoroughness
         self.announce("curves of bifurcations of {model}")
         curves = [
-            follow_curve(bifurcation, branch.period, span, plane, CURVE_POINTS, advance, how.curve_control)
+            two_parameters.follow_curve(
+                bifurcation, branch.period, span, plane, CURVE_POINTS, advance, how.curve_control
+            )
             for branch in family.branches
             for bifurcation in branch.bifurcations
             if branch.period <= how.curve_periods * self.step_map.stride and bifurcation.kind != "torus"
@@ -237,7 +232,7 @@ class FamilySearch:
         regions = None
         if self.thoroughness.other_gaits and self.steps_are_alike:
             self.announce("regions of the plane of two parameters")
-            regions = find_regions(family.branches, span, plane, advance)
+            regions = two_parameters.find_regions(family.branches, span, plane, advance)
         return replace(family, curves=tuple(curve for curve in curves if curve is not None), regions=regions)
 
 

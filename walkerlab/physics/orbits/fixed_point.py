@@ -24,19 +24,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     replace_fields,
     swing_foot_motion,
 )
+from walkerlab.physics.orbits import rigid_map
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.physics.orbits.newton import Effort, NotConverged
-from walkerlab.physics.orbits.rigid_map import (
-    EXACT_STEPS,
-    MAX_START_EVALUATIONS,
-    NEAR_RESIDUAL,
-    NEW_GAIT,
-    SMALLEST_MOVE,
-    RigidMap,
-    RigidStepper,
-    state_on_section,
-    strike_section,
-)
 from walkerlab.physics.orbits.similarity import HIPS, Units, unit_walker
 from walkerlab.physics.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near, sort_multipliers
@@ -152,9 +142,9 @@ def select_straight(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
 
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
     """Walk the steps of a gait of the unit walker and measure them in SI, or None if a step fails."""
-    start = state_on_section(walker, gait.z)
+    start = rigid_map.state_on_section(walker, gait.z)
     count = len(gait.steps)
-    step = take_walk(walker, EXACT_STEPS, start, count, sampled=True)
+    step = take_walk(walker, rigid_map.EXACT_STEPS, start, count, sampled=True)
     if step.steps < count or step.samples is None:
         return None
     models = (walker, walker.exchanged)[:count]
@@ -350,8 +340,8 @@ def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
-def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
-    return RigidMap(partial(change_slope, walker), 1.0, walker, tolerances)
+def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> rigid_map.RigidMap:
+    return rigid_map.RigidMap(partial(change_slope, walker), 1.0, walker, tolerances)
 
 
 def average_legs(walker: RigidModel, share: float) -> RigidModel:
@@ -395,8 +385,8 @@ class Search:
         self.followed = SEED_SOURCE if walker.passive else DRIVE_SOURCE
         if walker.legs_differ:
             self.followed = MEAN_LEGS_SOURCE
-        self.looking = RigidStepper(self.walker, SEARCH_TOLERANCES)
-        self.step_map = map_over_slope(self.walker, EXACT_STEPS)
+        self.looking = rigid_map.RigidStepper(self.walker, SEARCH_TOLERANCES)
+        self.step_map = map_over_slope(self.walker, rigid_map.EXACT_STEPS)
 
     def follow_seeds(self) -> None:
         if self.walker.slope <= 0.0 or not self.walker.passive or self.walker.legs_differ:
@@ -415,7 +405,7 @@ class Search:
             self.lost.append("only one leg has a knee, so there is no walker with two mean legs to start from")
             return
         even = average_legs(goal, 0.0)
-        family = RigidMap(partial(average_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
+        family = rigid_map.RigidMap(partial(average_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
 
         def gait_at(share: float, expected: Floats) -> Floats | None:
             effort = Effort(FOLLOWING_TOLERANCE, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
@@ -441,7 +431,7 @@ class Search:
             passive = Search(scale_drive(goal, slope, 0.0))
             passive.follow_seeds()
             passive.draw(generator, starts)
-            family = RigidMap(partial(scale_drive, goal, slope), 1.0, goal)
+            family = rigid_map.RigidMap(partial(scale_drive, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), max_points=MAX_DRIVE_POINTS)
             name = f"passive gait at {slope:.3g} rad"
             lost = "is lost at {:.0%} of the way to this slope and drive"
@@ -467,17 +457,17 @@ class Search:
             self.search_strides(starts)
             return
         gaits = [(record.cycle.z, record.cycle.DP) for record in self.records]
-        results = self.looking.solve_starts(strike_section(self.walker), gaits, starts)
+        results = self.looking.solve_starts(rigid_map.strike_section(self.walker), gaits, starts)
         for z, gait in zip(starts, results, strict=True):
             if gait >= 0:
                 self.records[gait].by.append(RANDOM_START)
-            elif gait == NEW_GAIT and not self.stands(z):
+            elif gait == rigid_map.NEW_GAIT and not self.stands(z):
                 self.keep(z, RANDOM_START)
 
     def search_strides(self, starts: Floats) -> None:
         """Look for fixed points of the stride map near each start (starts, d), and keep those that are new."""
         quick = map_over_slope(self.walker, SEARCH_TOLERANCES)
-        effort = Effort(NEAR_RESIDUAL, MAX_START_EVALUATIONS, SMALLEST_MOVE)
+        effort = Effort(rigid_map.NEAR_RESIDUAL, rigid_map.MAX_START_EVALUATIONS, rigid_map.SMALLEST_MOVE)
         for start in starts:
             gait = gait_near(quick, start, float(self.walker.slope), effort, STRIDE)
             if not isinstance(gait, NotConverged) and not self.stands(gait.z):

@@ -22,8 +22,8 @@ from walkerlab.physics.hybrid.comparison import (
     difference_in_time,
     smooth_phases,
 )
-from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, scale_laws
 from walkerlab.physics.orbits.contact_map import AdaptivePads, contact_step
 from walkerlab.physics.orbits.step_map import Cycle, gait_near

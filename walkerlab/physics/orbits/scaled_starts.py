@@ -17,8 +17,8 @@ import numpy as np
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
+from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.physics.hybrid.recorded_walk import scale_rates, take_walk
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances

@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.solvers import dop853_tableau as tableau
 from walkerlab.physics.solvers import stepping
-from walkerlab.physics.solvers.fused import fused
+from walkerlab.physics.solvers.lanes import fused
 from walkerlab.physics.solvers.stepping import (
     ACCEPTED,
     BUDGET,

@@ -5,16 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config.files import (
-    BUILTIN_FOLDER,
-    DEFAULT,
-    ConfigFile,
-    builtin_config,
-    builtin_names,
-    config_to_extend,
-    find_config,
-    is_file,
-)
+from walkerlab.config import files
 from walkerlab.config.loader import LoadedConfig, key_of, load
 from walkerlab.config.problems import problem_error
 from walkerlab.config.reads import flatten
@@ -59,7 +50,7 @@ def resolve(
     """
     path = None if text is None else Path(text)
     run = None
-    if path is not None and text not in builtin_names() and not (is_file(path) and path.suffix != SUFFIX):
+    if path is not None and text not in files.builtin_names() and not (files.is_file(path) and path.suffix != SUFFIX):
         run = artifact_at(path) or run_at(str(text), runs)
     if run is not None:
         folder, earlier = run
@@ -75,7 +66,7 @@ def resolve(
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
-    return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), config_to_extend(text))
+    return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), files.config_to_extend(text))
 
 
 def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
@@ -85,11 +76,11 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
     """
     source = folder.source.partition(" with ")[0]
     is_builtin = source.startswith(BUILTIN)
-    path = BUILTIN_FOLDER / source.removeprefix(BUILTIN) if is_builtin else folder.runs_dir / source
-    file = ConfigFile(path, source if is_builtin else os.path.relpath(path))
+    path = files.BUILTIN_FOLDER / source.removeprefix(BUILTIN) if is_builtin else folder.runs_dir / source
+    file = files.ConfigFile(path, source if is_builtin else os.path.relpath(path))
     if not source:
         return "", []
-    if not is_file(path):
+    if not files.is_file(path):
         return file.label, ["it is no longer there"]
     try:
         edited = load(file).config
@@ -136,9 +127,9 @@ def refuse_invalid_parts(read: LoadedConfig) -> None:
         raise problem_error(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
 
 
-def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
+def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:
     """Return the run of an artifact and the config stored in it, or None if there is no such file."""
-    if path.suffix != SUFFIX or not is_file(path):
+    if path.suffix != SUFFIX or not files.is_file(path):
         return None
     folder = RunFolder.open_folder(path.parent)
     try:
@@ -148,10 +139,10 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
             f"{path} is damaged, and no config can be taken from it: {error}.",
             f"Use the config of its folder: `-c {folder.quoted_path}`.",
         ) from None
-    return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
+    return folder, files.ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
 
 
-def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
+def run_at(text: str, runs: Path) -> tuple[RunFolder, files.ConfigFile] | None:
     """Return the run with this name or folder, and its config, or None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
@@ -162,7 +153,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
         raise ConfigError(
             f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )
-    return folder, ConfigFile(Path(folder.name), str(folder.path), config, folder.changes)
+    return folder, files.ConfigFile(Path(folder.name), str(folder.path), config, folder.changes)
 
 
 def source_of(path: Path | None, runs: Path) -> str:
@@ -170,7 +161,7 @@ def source_of(path: Path | None, runs: Path) -> str:
 
     The path is relative so that a project can be moved together with its runs.
     """
-    file = (builtin_config(DEFAULT) if path is None else find_config(path)).path.resolve()
-    if file.parent == BUILTIN_FOLDER.resolve():
+    file = (files.builtin_config(files.DEFAULT) if path is None else files.find_config(path)).path.resolve()
+    if file.parent == files.BUILTIN_FOLDER.resolve():
         return f"{BUILTIN}{file.name}"
     return os.path.relpath(file, runs.resolve())

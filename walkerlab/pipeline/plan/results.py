@@ -18,9 +18,8 @@ from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.artifact import Identity, Stored, Verdict, broken_file, changed_parts
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.files import replacing
+from walkerlab.pipeline.store.files import Checkpoint, replacing
 from walkerlab.pipeline.store.provenance import Provenance
 from walkerlab.pipeline.store.runs import RunFolder
 

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.workers import SizedExecutor, WorkerDiedError, WorkerPool
-from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
+from walkerlab.pipeline.store.files import Checkpoint, Numbers
 
 SCOUTS: Final = 2
 """Size of the first batch. It runs alone, so that the kernels are compiled only once, and shows the time of a unit."""

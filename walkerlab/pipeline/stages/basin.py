@@ -1,7 +1,5 @@
 """Basins of attraction: the starts that lead to walking, the attractors that they reach, and the steps needed."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,37 +17,17 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.physics.hybrid.rigid_lanes import two_legs
 from walkerlab.physics.mechanics.rigid_model import RigidModel
-from walkerlab.physics.orbits.basin import (
-    ATOL,
-    RTOL,
-    UNREACHED,
-    Attractors,
-    WalkEnds,
-    Walker,
-    Window,
-    edge_cells,
-    find_attractors,
-    stride_of,
-    subcell_centres,
-    walk_to_attractor,
-)
+from walkerlab.physics.orbits import basin as grid
 from walkerlab.physics.orbits.rigid_map import state_on_section
 from walkerlab.physics.orbits.scaled_starts import ScaledStarts
 from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
-from walkerlab.pipeline.stages.numerical_error import evenly_spread, tightened
-from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes, step_asymmetry
-from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes, evenly_spread, step_asymmetry, tightened
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.contact import (
-    ContactScene,
-    contact_gait,
-    scene_on_pads,
-    start_state,
-    tolerances_of,
-)
+from walkerlab.pipeline.store.files import Checkpoint
+from walkerlab.scene import contact
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
@@ -57,7 +35,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqr
 REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
-FAILED = UNREACHED - 1  # code of a cell whose walk fails
+FAILED = grid.UNREACHED - 1  # code of a cell whose walk fails
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -89,9 +67,9 @@ def run(
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
-    ends = WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
+    ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
-    edges = edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
+    edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
         refine = config.basin.refine
@@ -112,7 +90,7 @@ def run(
     return Content({"basin": group_of(config.basin, window, ends, walking)}, answer, timed=("trajectories_per_s",))
 
 
-def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
+def sample_again(question: "Question", window: grid.Window, ends: grid.WalkEnds) -> dict[str, int]:
     """Repeat the walks from evenly spaced cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     tighter = question.tightened().walk_to_ends(window.starts(cells))
@@ -120,7 +98,7 @@ def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str
     return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
 
 
-def window_of(config: BasinConfig, z: list[float]) -> Window:
+def window_of(config: BasinConfig, z: list[float]) -> grid.Window:
     """Build the grid of starts around the section coordinates z (3) of the gait."""
     settings = config.basin
     axes = tuple(COORDINATES.index(name) for name in settings.plane)
@@ -130,10 +108,12 @@ def window_of(config: BasinConfig, z: list[float]) -> Window:
     upper = settings.upper or tuple(z[axis] + half[axis] for axis in axes)
     if any(b <= a for a, b in zip(lower, upper, strict=True)):
         raise ConfigError("basin.lower is not below basin.upper.", "Give both bounds.")
-    return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
+    return grid.Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
-def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: RigidModel) -> Question:
+def question_of(
+    config: BasinConfig, inputs: Mapping[str, Content], window: grid.Window, rigid: RigidModel
+) -> "Question":
     """Build the model whose walks are classified, and find its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
@@ -143,13 +123,13 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
     starts = np.concatenate([np.array([window.rest]), window.draw(SEARCHED_STARTS, generator)])
-    attractors = find_attractors(walker, starts * np.array(scale), config.seed)
+    attractors = grid.find_attractors(walker, starts * np.array(scale), config.seed)
     question = RigidQuestion(rigid, walker, scale, attractors, config.basin.steps)
     one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
     return question if legs is not None else one_by_one
 
 
-def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
+def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> "ContactQuestion":
     """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
@@ -160,15 +140,15 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     steps = config.basin.contact_steps
     step_length_m = float(gait["step_length_m"])
     state = as_state(gait["state"])
-    answer = contact_gait(config, step_length_m, state)
+    answer = contact.contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
-    scene = replace(scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
-    starts = build_scaled_starts(scene, rigid, state, steps, answer, tolerances_of(config, steps))
+    scene = replace(contact.scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
+    starts = build_scaled_starts(scene, rigid, state, steps, answer, contact.tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
     return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
-def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
+def group_of(settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats) -> Group:
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
         name: Variable(window.cell_centres(index), (name,), UNITS[axis], TEXTS[axis])
@@ -178,7 +158,7 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
     def grid_variable(values: Any, text: str) -> Variable:
         return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
 
-    settled = np.where(ends.attractor == UNREACHED, 0, ends.steps)
+    settled = np.where(ends.attractor == grid.UNREACHED, 0, ends.steps)
     variables |= {
         "outcome": grid_variable(ends.outcome, "how the walk ended; codes in attribute outcomes"),
         "attractor": grid_variable(ends.attractor, "index of the attractor that was reached; -1: none"),
@@ -190,7 +170,9 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
 
 
-def summary(settings: Basin, window: Window, ends: WalkEnds, walking: Floats, question: Question) -> dict[str, Any]:
+def summary(
+    settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats, question: "Question"
+) -> dict[str, Any]:
     walks = ends.outcome == Outcome.WALKED
     attractors = question.attractor_rows()
     for number, row in enumerate(attractors):
@@ -211,19 +193,19 @@ def summary(settings: Basin, window: Window, ends: WalkEnds, walking: Floats, qu
         "outcomes": count_outcomes(ends.outcome),
         "attractors": attractors,
         "aperiodic": question.aperiodic,
-        "unsettled_cells": int(np.count_nonzero(walks & (ends.attractor == UNREACHED))),
+        "unsettled_cells": int(np.count_nonzero(walks & (ends.attractor == grid.UNREACHED))),
         "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
     }
 
 
-def gaussian(window: Window) -> Floats:
+def gaussian(window: grid.Window) -> Floats:
     """Return the weight of each cell in a normal distribution around the window's centre. The sum is 1."""
     off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
     weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
 
 
-def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
+def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
     """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing if no
     cell fails.
     """
@@ -241,14 +223,14 @@ class RigidQuestion:
     """Rigid model, with the rules that classify the ends of its walks."""
 
     rigid: RigidModel
-    walker: Walker  # the unit walker
+    walker: grid.Walker  # the unit walker
     scale: tuple[float, float, float]  # factors from section coordinates in SI to those of the unit walker
-    attractors: Attractors
+    attractors: grid.Attractors
     steps: int
     cells_at_once: int = 10_000
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # minimum number of walks for which starting processes saves time
-    tolerances: tuple[float, float] = (RTOL, ATOL)
+    tolerances: tuple[float, float] = (grid.RTOL, grid.ATOL)
     pads: ClassVar[None] = None  # the rigid model's ground has no pads
 
     @property
@@ -260,16 +242,16 @@ class RigidQuestion:
         rows = []
         for cycle in self.attractors.cycles:
             state = state_on_section(self.rigid, tuple((cycle.points[0] / np.array(self.scale)).tolist()))
-            period = cycle.period * stride_of(self.walker)
+            period = cycle.period * grid.stride_of(self.walker)
             rows.append({"period": period, "state": list(state), "reached_within": cycle.reach})
         return rows
 
-    def walk_to_ends(self, z: Floats) -> WalkEnds:
+    def walk_to_ends(self, z: Floats) -> grid.WalkEnds:
         """Simulate walks from section coordinates z (n, 3), SI, until each ends or reaches an attractor."""
         scaled = z * np.array(self.scale)
-        return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
+        return grid.walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
-    def tightened(self) -> RigidQuestion:
+    def tightened(self) -> "RigidQuestion":
         """Return the same model with tolerances a hundred times tighter."""
         rtol, atol = self.tolerances
         return replace(self, tolerances=(rtol / 100.0, atol / 100.0))
@@ -281,7 +263,7 @@ class ContactQuestion:
     touches the ground and rolls without slip.
     """
 
-    scene: ContactScene
+    scene: contact.ContactScene
     rigid: RigidModel
     starts: ScaledStarts
     pads: Pads
@@ -298,19 +280,19 @@ class ContactQuestion:
         period_s, length_m = np.mean(gait, axis=0).tolist()
         return [{"period": len(gait), "period_s": period_s, "step_length_m": length_m}]
 
-    def walk_to_ends(self, z: Floats) -> WalkEnds:
+    def walk_to_ends(self, z: Floats) -> grid.WalkEnds:
         """Simulate walks from section coordinates z (n, 3), SI."""
         rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
-        return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
+        return grid.WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
         """Simulate a walk from section coordinates z (3), SI. Return outcome, attractor and number of steps."""
         state = state_on_section(self.rigid, z)
-        walk = self.starts.walk_from(start_state(self.scene, state))
+        walk = self.starts.walk_from(contact.start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
-        return (walk.outcome, UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
+        return (walk.outcome, grid.UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
 
-    def tightened(self) -> ContactQuestion:
+    def tightened(self) -> "ContactQuestion":
         """Return the same model with the tighter tolerances of `numerical_error.tightened`."""
         return replace(self, starts=replace(self.starts, tolerances=tightened(self.starts.tolerances)[0]))
 
@@ -326,15 +308,15 @@ def units_of(
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 
 
-def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
+def ends_of(question: "Question", window: grid.Window, cells: Sequence[int]) -> list[float]:
     """Simulate walks from the centres of cells. Return their outcomes, attractors and step counts as one flat list."""
     ends = question.walk_to_ends(window.starts(np.array(cells)))
     return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 
 
-def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
+def shares_of(question: "Question", window: grid.Window, refine: int, cells: Sequence[int]) -> list[float]:
     """Return the fraction of each cell that leads to walking, from walks that start at the centres of its subcells."""
-    inside = subcell_centres(refine, len(window.axes))
+    inside = grid.subcell_centres(refine, len(window.axes))
     ends = question.walk_to_ends(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (ends.outcome == Outcome.WALKED).reshape(len(cells), -1)
     return [float(share) for share in walking.mean(axis=1)]

@@ -8,11 +8,10 @@ import numpy as np
 
 from walkerlab.config.reads import ContactSimConfig
 from walkerlab.physics.energy_channels import SAMPLED
-from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_energies, sample_feet
-from walkerlab.physics.mechanics.walkers import TORSO
+from walkerlab.physics.mechanics.parts import hinge_point
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
@@ -30,17 +29,10 @@ from walkerlab.pipeline.stages.walk import (
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
-from walkerlab.scene.contact import (
-    SAMPLES_PER_PENDULUM_TIME,
-    ContactScene,
-    require_contact,
-    scene_measures,
-    scene_on_pads,
-    start_state,
-    tolerances_of,
-)
-from walkerlab.scene.footholds import foothold_heights
+from walkerlab.scene import contact
 from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene.parts import TORSO
+from walkerlab.scene.rigid import foothold_heights
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
 SCUFFED = (
@@ -57,11 +49,11 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     Raises NoAnswer if the solver fails.
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
-    scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=step_asymmetry(config, inputs))
-    start = start_state(scene, rigid_state)
+    scene = contact.scene_on_pads(config, rigid_step, rigid_state, asymmetry=step_asymmetry(config, inputs))
+    start = contact.start_state(scene, rigid_state)
     steps = 2 * config.strides
-    tolerances = tolerances_of(config, steps)
-    interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
+    tolerances = contact.tolerances_of(config, steps)
+    interval = scene.ground.frame.pendulum_time / contact.SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
     warn_of_unresolved_slip(tolerances.atol, scene, progress)
 
@@ -76,7 +68,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
 
 
-def warn_of_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
+def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: Progress) -> None:
     """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
@@ -96,8 +88,8 @@ def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict
     return {"asymmetry": {**numbers["asymmetry"], "stance_time": asymmetry_of(first, second)}}
 
 
-def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
+def summary(config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+    scuffed = contact.require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
     numbers = summarise_walk(walk)
     return {
@@ -118,7 +110,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
         ),
         "jacobians": walk.work.jacobians,
         "slope_rad": scene.walker.slope,
-        **scene_measures(scene),
+        **contact.scene_measures(scene),
         "left_out": list(contact_walk_omissions(config)),
     }
 
@@ -128,7 +120,7 @@ def mean_of(values: Floats) -> float | None:
     return float(np.mean(values)) if values.size else None
 
 
-def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
+def groups(config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
     stored: dict[str, Group] = {}
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
@@ -155,7 +147,7 @@ def pads_group(terrain: Terrain, end: float) -> Group:
 
 
 def trajectory_group(
-    config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
+    config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
     """Build the group of the sampled quantities that the config's `outputs` select."""
     variables = {**variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
@@ -178,7 +170,7 @@ def trajectory_group(
     return Group(variables)
 
 
-def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
+def state_variables(scene: contact.ContactScene, y: Floats) -> dict[str, Variable]:
     """Return the motion of legs, shanks and torso, and the positions of hip and knees."""
     walker = scene.walker
     layout = scene.walker.whole
@@ -210,7 +202,9 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     return variables
 
 
-def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats, up: Floats) -> dict[str, Variable]:
+def energy_variables(
+    scene: contact.ContactScene, samples: ContactSamples, foothold: Floats, up: Floats
+) -> dict[str, Variable]:
     """Return energies relative to the current foothold, as in the paper, and the energy balance from a fixed origin.
 
     foothold, up  (samples,) m, position of the stance foothold along the slope, and its height above the slope

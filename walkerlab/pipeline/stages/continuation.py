@@ -1,7 +1,5 @@
 """Families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -25,11 +23,11 @@ from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.orbits.two_parameters import Plane
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
-from walkerlab.pipeline.stages.numerical_error import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
+from walkerlab.pipeline.stages.walk import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.families import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
@@ -65,7 +63,7 @@ class FamilyQuestion:
         return (RIGID, CONTACT) if model == "both" else (model,)
 
     @property
-    def second(self) -> FamilyQuestion | None:
+    def second(self) -> "FamilyQuestion | None":
         """Second parameter and its span, or None if the config has no second key."""
         block = self.config.continuation.second
         return None if block is None else question_over(block, self.config, "continuation", "second")

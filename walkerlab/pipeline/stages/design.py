@@ -1,7 +1,5 @@
 """Optimise a quantity of a walker's gait by varying parameters within bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -30,12 +28,11 @@ from walkerlab.physics.orbits.robustness import LARGEST, GaitOnMap, largest_dist
 from walkerlab.physics.orbits.step_map import gait_near, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, rows_group
-from walkerlab.scene.families import refuse_unread
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.parameter import Parameter, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
 SOLVED: Final = Effort(1e-10)
 DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds

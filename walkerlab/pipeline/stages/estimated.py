@@ -1,7 +1,5 @@
 """Checks of the `identify` block that the stages `identify` and `plan` share: parameters, priors and models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -9,9 +7,9 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
-from walkerlab.scene.families import refuse_unread
 from walkerlab.scene.identification import SCALE_OF_ZERO
 from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.subject import refuse_unread
 
 EXACT: Final = 1e-9  # a prior whose standard deviation is below this fraction of its value counts as exact
 

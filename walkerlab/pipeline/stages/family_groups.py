@@ -1,7 +1,5 @@
 """Stored groups of gait families: branches with bifurcations, attractors, curves and sampled walks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -9,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.ground import Footholds
+from walkerlab.config.contact import Footholds
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.schema import Output
 from walkerlab.labels import Label
@@ -21,9 +19,8 @@ from walkerlab.physics.orbits.step_map import Cycle, Monitor
 from walkerlab.physics.orbits.two_parameters import BifurcationCurve, Regions
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.pipeline.stages.numerical_error import evenly_spread
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
-from walkerlab.pipeline.stages.walk import select_samples
+from walkerlab.pipeline.stages.walk import evenly_spread, select_samples
 from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene

@@ -1,16 +1,15 @@
 """Estimate parameters of a walker from a measured walk."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
 from walkerlab.config.fields import leaves, value_at
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import IdentifyConfig
+from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.information import is_open
@@ -29,9 +28,6 @@ from walkerlab.pipeline.store.content import Content, Group, Variable, numbered,
 from walkerlab.scene.identification import LEGS, identify_walk
 from walkerlab.scene.parameter import SLOPE, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-
-if TYPE_CHECKING:
-    from walkerlab.config.schema import Config
 
 LABELS: Final = {
     "key": Label("", "parameter of the config"),

@@ -1,25 +1,21 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
 from walkerlab.config.analyses import Plan
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import PlanConfig
+from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.measurement_plan import WayToMeasure, plan_measurements
 from walkerlab.scene.parameter import parameter_of
-
-if TYPE_CHECKING:
-    from walkerlab.config.schema import Config
 
 ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 

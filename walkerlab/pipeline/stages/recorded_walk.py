@@ -1,16 +1,16 @@
 """Stage `recorded-walk`: read a walk recorded elsewhere, and store it like a computed walk."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from walkerlab.config.reads import RecordedWalkConfig
+from walkerlab.config.recording import RecordedFile
+from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import LEG_QUANTITIES, WALKER_QUANTITIES, RecordedWalk, as_walk
 from walkerlab.exchange.leg_angles import mend_angles
@@ -26,10 +26,6 @@ from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
-
-if TYPE_CHECKING:
-    from walkerlab.config.recording import RecordedFile
-    from walkerlab.config.schema import Config
 
 NOISY = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 

@@ -1,7 +1,5 @@
 """Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
@@ -9,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from walkerlab.config.contact import Footholds
 from walkerlab.config.drives import drives_of
-from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import RobustnessConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
@@ -35,12 +33,11 @@ from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.run.workers import map_in_order
 from walkerlab.pipeline.stages.rigid_groups import groups as groups_of_walk
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable, rows_group
-from walkerlab.scene.families import model_reads, refuse_unread
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.parameter import parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_scene
-from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait, model_reads, refuse_unread
 
 Rows = list[dict[str, Any]]
 

@@ -1,14 +1,24 @@
-"""Atomic writing of files, and errors of the file system."""
+"""Files: atomic writing, errors of the file system, CSV that is safe to open in a spreadsheet, and checkpoints.
+
+A checkpoint is a journal next to the artifact, from which an interrupted run resumes: first the key of the result, then
+a line for each unit of work, each with a checksum. Lines are only appended; an incomplete last line is dropped.
+"""
 
 import contextlib
+import csv
 import errno
 import hashlib
+import io
 import itertools
+import json
 import os
+import re
 import secrets
 import stat
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from walkerlab.errors import StorageError
 
@@ -182,3 +192,86 @@ def remove_leftovers(folder: Path) -> list[Path]:
         with storing(path):
             path.unlink(missing_ok=True)
     return leftovers
+
+
+FORMULA = re.compile(r"[=+\-@\t\r]")
+"""Pattern of the first character of texts that a spreadsheet would evaluate."""
+NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
+    """Format rows as CSV below a header. A missing value becomes an empty cell."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(map(csv_cell, heads))
+    writer.writerows(map(csv_cell, row) for row in rows)
+    return text.getvalue().encode()
+
+
+def csv_cell(value: Any) -> Any:
+    """Convert a value to a CSV cell. Text that a spreadsheet would evaluate gets a leading apostrophe."""
+    if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
+        return f"'{value}"
+    return "" if value is None else value
+
+
+Numbers = list[float]
+
+
+class Checkpoint:
+    """Numbers computed by the completed work units of one result, by name of the unit."""
+
+    def __init__(self, path: Path | None, key: str) -> None:
+        """Resume from the journal at `path` if its key matches, otherwise start over with the first unit.
+
+        path  path of the journal; None to keep the numbers only in memory
+        """
+        self.path = path
+        self.key = key
+        self.kept: dict[str, Numbers] = {}
+        self._intact = 0  # number of valid bytes in the file
+        with contextlib.suppress(OSError, ValueError, TypeError):  # the last line may be incomplete
+            lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
+            for text in lines if lines[:1] == [line([key])] else []:
+                entry = json.loads(text.partition(b" ")[2])
+                if text != line(entry):
+                    break
+                if self._intact:
+                    name, numbers = entry
+                    self.kept[str(name)] = [float(number) for number in numbers]
+                self._intact += len(text)
+
+    def keep(self, name: str, numbers: Numbers) -> None:
+        """Add the numbers of a unit.
+
+        Raises StorageError if they cannot be stored.
+        """
+        self.kept[name] = numbers
+        if self.path is None:
+            return
+        with storing(self.path), self.path.open("r+b" if self._intact else "wb") as file:
+            file.truncate(self._intact)
+            file.seek(self._intact)
+            if not self._intact:
+                file.write(line([self.key]))
+            file.write(line([name, numbers]))
+            file.flush()
+            os.fsync(file.fileno())
+            self._intact = file.tell()
+
+    def forget(self) -> None:
+        """Remove all units.
+
+        Raises StorageError if the journal cannot be removed.
+        """
+        self.kept = {}
+        self._intact = 0
+        if self.path is not None:
+            with storing(self.path):
+                self.path.unlink(missing_ok=True)
+
+
+def line(value: object) -> bytes:
+    """Encode a value as a line with its checksum. Numbers are restored exactly."""
+    text = json.dumps(value, allow_nan=False).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)

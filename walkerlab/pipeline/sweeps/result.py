@@ -15,7 +15,7 @@ from walkerlab.physics.solvers.system import Integers
 from walkerlab.pipeline.headlines import LAST_STEP_SOURCES, headlines
 from walkerlab.pipeline.store.artifact import InTurn
 from walkerlab.pipeline.store.content import Content, Variable
-from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.files import csv_text
 from walkerlab.pipeline.store.hdf5 import stored_bytes
 from walkerlab.pipeline.sweeps.chunk import Chunk
 from walkerlab.pipeline.sweeps.question import SweptStage, described

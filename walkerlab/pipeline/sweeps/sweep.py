@@ -22,7 +22,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.run.work import Spread, WorkUnit
-from walkerlab.pipeline.stages.numerical_error import SAMPLE, evenly_spread
+from walkerlab.pipeline.stages.walk import SAMPLE, evenly_spread
 from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content, Group

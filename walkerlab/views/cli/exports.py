@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,12 +27,10 @@ from walkerlab.pipeline.plan.resolve import warn_of_edits
 from walkerlab.pipeline.plan.results import FolderResults
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Group
-from walkerlab.pipeline.store.csv_text import csv_text
-from walkerlab.pipeline.store.files import as_text
-from walkerlab.pipeline.store.runs import RunFolder, config_of, read_all, run_named
+from walkerlab.pipeline.store.files import as_text, csv_text, storing, write_through
+from walkerlab.pipeline.store.runs import RunFolder, config_of, owner_of, read_all, run_named
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
-from walkerlab.views.cli.target import Target, write_file
 from walkerlab.views.figures.style import EXPORT_DPI
 from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
@@ -39,6 +38,60 @@ from walkerlab.views.report.words import MODEL_NAMES
 
 if TYPE_CHECKING:
     from walkerlab.views.figures.illustration import Illustration
+
+
+@dataclass(frozen=True)
+class Target:
+    """Destination of an export."""
+
+    to: str | None  # format, or file name if `output` is None
+    output: Path | None  # file; None derives its name from the run
+    inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
+
+    def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
+        """Return file and format (default: first of `kinds`).
+
+        Raises ConfigError for an unknown format or a protected file.
+        """
+        a_file = self.to is not None and self.output is None and "." in self.to
+        output = Path(str(self.to)) if a_file else self.output
+        ending = "" if output is None else output.suffix.removeprefix(".")
+        kind = (None if a_file else self.to) or ending or kinds[0]
+        if kind not in kinds:
+            raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
+        if ending in kinds and ending != kind:
+            raise ConfigError(f"--to {kind} contradicts the ending of {output}.", "Leave out --to, or rename the file.")
+        path = output or Path(f"{stem}.{kind}")
+        with storing(path):
+            self.refuse(path, kind)
+        return path, kind
+
+    def refuse(self, path: Path, kind: str) -> None:
+        """Raise ConfigError if the file is a folder, an input of the command, or a result of a run."""
+        another = "Nothing was written; name another file with -o."
+        if path.is_dir():
+            raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
+        if path.exists() and any(file.exists() and path.samefile(file) for file in self.inputs):
+            raise ConfigError(f"{path} is an input of this command.", another)
+        owner = owner_of(path, PIPELINE.names)
+        if owner is not None:
+            raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
+
+
+def write_file(path: Path, data: bytes, console: Console) -> Path:
+    """Write a file, and warn if it replaces a file with different content.
+
+    Raises StorageError if writing fails.
+    """
+    replaced = path.is_file() and path.read_bytes() != data
+    try:
+        write_through(path, data)
+    except StorageError as error:
+        raise StorageError(error.message, "Name another file with -o.") from error
+    if replaced:
+        console.warn(f"{path} existed and was replaced.")
+    return path
+
 
 FIGURE_KINDS = ("pdf", "svg", "png", "eps", "tiff")
 TRAJECTORY_KINDS = ("csv", "nc")
@@ -153,7 +206,7 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     Raises ConfigError, which lists the items of the run, for an unknown name.
     """
     # Imported here: tables of the paper's values need no drawing code.
-    from walkerlab.views.figures.registry import FIGURES
+    from walkerlab.views.figures.stage import FIGURES
 
     figures = {illustration.name: illustration for illustration in FIGURES}
     if name in figures:

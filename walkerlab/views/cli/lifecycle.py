@@ -112,7 +112,7 @@ def export(
     ] = None,
 ) -> None:
     """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
-    from walkerlab.views.cli.target import Target
+    from walkerlab.views.cli.exports import Target
 
     if what == "model":
         # Imported here: only this export needs a walker.
@@ -143,8 +143,7 @@ def draw(
     output: Output = None,
 ) -> None:
     """Draw a config's walker to scale, with dimensions labelled by their config keys."""
-    from walkerlab.views.cli.exports import draw_walker
-    from walkerlab.views.cli.target import Target
+    from walkerlab.views.cli.exports import Target, draw_walker
 
     print(draw_walker(file, Target(to, output), request.console))
 
@@ -180,8 +179,7 @@ def animate(
     request: Request,
     run: RunArgument,
     to: Annotated[
-        str | None,
-        typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
+        str | None, typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name.")
     ] = None,
     output: Output = None,
     model: Annotated[
@@ -196,8 +194,7 @@ def animate(
     slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
 ) -> None:
     """Animate a run's walk, or the walks of both models in one picture."""
-    from walkerlab.views.cli.exports import BOTH, Film, run_to_export, walk_in, write_film
-    from walkerlab.views.cli.target import Target
+    from walkerlab.views.cli.exports import BOTH, Film, Target, run_to_export, walk_in, write_film
 
     folder = run_to_export(run, request)
     film = Film(BOTH if model == BOTH else walk_in(folder, model), steps, rate, slower)

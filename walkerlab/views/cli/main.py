@@ -107,8 +107,7 @@ def options_of_the_program(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and the commit.")] = False,
     verbose: Annotated[
-        bool,
-        typer.Option("--verbose", "-v", help="With --version: also print where compiled code comes from."),
+        bool, typer.Option("--verbose", "-v", help="With --version: also print where compiled code comes from.")
     ] = False,
 ) -> None:
     """Print the version, or leave the rest to a command."""

@@ -13,7 +13,7 @@ from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.provenance import git_commit
 from walkerlab.views.cli.console import Console
-from walkerlab.views.cli.target import Target, write_file
+from walkerlab.views.cli.exports import Target, write_file
 
 
 def write_model(

@@ -23,6 +23,7 @@ from typer.core import TyperCommand
 from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
 from walkerlab.extensions import check_names, external_extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.stage import Option
 from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.console import Console
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
     from walkerlab.pipeline.plan.resolve import ResolvedRun
-    from walkerlab.pipeline.plan.stage import Option
     from walkerlab.pipeline.store.runs import RunFolder
 
 

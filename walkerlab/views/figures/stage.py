@@ -1,9 +1,14 @@
-"""The `plot` stage: draws every figure whose results are available, as SVG and PNG."""
+"""The `plot` stage: draws every figure whose results are available, as SVG and PNG.
+
+`FIGURES` has all figures in display order: those with a number of the paper, then others, including those of
+extensions.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from walkerlab.config.reads import NamedConfig
+from walkerlab.extensions import extensions, load
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store import artifact
@@ -12,8 +17,20 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import make_folder, storing, write_atomically
 from walkerlab.pipeline.store.runs import FIGURES_FOLDER
 from walkerlab.scene.omissions import LeftOut
+from walkerlab.views.figures import families, ground, identification, maps, robustness, stick_diagram, walks
 from walkerlab.views.figures.illustration import Illustration
-from walkerlab.views.figures.registry import FIGURES
+
+ADDED: tuple[Illustration, ...] = tuple(
+    figure for extension in extensions().values() if extension.figures for figure in load(extension.figures)
+)
+NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES, *ADDED)
+FIGURES: tuple[Illustration, ...] = (
+    *sorted((figure for figure in NUMBERED if figure.number is not None), key=lambda figure: figure.name),
+    *ground.FIGURES,
+    *identification.FIGURES,
+    *(figure for figure in ADDED if figure.number is None),
+    *maps.STABILITY,
+)
 
 
 def run(

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.pipeline.store.footholds import FAR_EDGE_M, ground_levels
+from walkerlab.pipeline.store.content import FAR_EDGE_M, Group, Variable, ground_levels
 from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION

@@ -1,7 +1,5 @@
 """Blocks and sections of the page, and the stored results that sections are made from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -39,7 +37,7 @@ class Paragraph:
 class Statements:
     """Statements shown together, in one of four layouts."""
 
-    items: tuple[Statement, ...]
+    items: "tuple[Statement, ...]"
     layout: Literal["list", "cards", "lines", "columns"] = "list"
 
 
@@ -219,7 +217,7 @@ class Section:
     @classmethod
     def create(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
-    ) -> Section | None:
+    ) -> "Section | None":
         """Create a section of the blocks that are not empty, or return None if all are empty."""
         filled = tuple(block for block in blocks if block)
         return cls(anchor, title, filled, finding, page) if filled else None

@@ -6,18 +6,8 @@ from functools import partial
 from typing import Any
 
 from walkerlab.labels import add_unit, unit_by_name
+from walkerlab.views.report import numbers
 from walkerlab.views.report.blocks import Paragraph, Results, Section, stage_section
-from walkerlab.views.report.numbers import (
-    DOT,
-    MINUS,
-    NONE,
-    SUBSCRIPTS,
-    drop_rounding,
-    fixed,
-    number,
-    power_of_ten,
-    typeset,
-)
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import legs_differ, words
 
@@ -32,31 +22,33 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
     """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
-    six = partial(fixed, decimals=6)
+    six = partial(numbers.fixed, decimals=6)
     multipliers = range(max(len(multipliers_of(gait)) for gait in sets.values()))
     differ = any(legs_differ(gait) for gait in sets.values())
     first = "multipliers of a stride " if differ else "multipliers "
-    titles = [typeset(f"{'' if place else first}lambda_{place + 1}") for place in multipliers]
+    titles = [numbers.typeset(f"{'' if place else first}lambda_{place + 1}") for place in multipliers]
     lines = [
         *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
         measured("step period T", "period_s", six),
         measured("step length S", "step_length_m", six),
         *(asymmetry_lines(six) if differ else ()),
         *(Column(title, partial(multiplier, place)) for place, title in enumerate(titles)),
-        Column(f"spectral radius{' per step' if differ else ''}", "spectral_radius", partial(fixed, decimals=5)),
+        Column(
+            f"spectral radius{' per step' if differ else ''}", "spectral_radius", partial(numbers.fixed, decimals=5)
+        ),
         Column("stable", "stable"),
-        *works(partial(number, digits=4)),
-        measured("speed", "speed_m_s", partial(fixed, decimals=4)),
-        measured("Froude number", "froude", partial(fixed, decimals=4)),
-        measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
-        measured("mean energy above the stance foot", "energy_J", partial(fixed, decimals=3)),
-        measured("energy drift", "energy_drift_J", partial(number, digits=2)),
-        measured("minimum normal force", "min_normal_force_N", partial(number, digits=4)),
-        Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
-        measured("minimum normal impulse", "min_normal_impulse_N_s", partial(number, digits=4)),
-        Column("largest impulse ratio", "max_impulse_ratio", partial(fixed, decimals=4)),
-        measured("scuffing depth", "max_scuff_depth_m", lambda depth: number(drop_rounding(depth), 4)),
-        Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
+        *works(partial(numbers.number, digits=4)),
+        measured("speed", "speed_m_s", partial(numbers.fixed, decimals=4)),
+        measured("Froude number", "froude", partial(numbers.fixed, decimals=4)),
+        measured("cost of transport", "cost_of_transport", partial(numbers.fixed, decimals=5)),
+        measured("mean energy above the stance foot", "energy_J", partial(numbers.fixed, decimals=3)),
+        measured("energy drift", "energy_drift_J", partial(numbers.number, digits=2)),
+        measured("minimum normal force", "min_normal_force_N", partial(numbers.number, digits=4)),
+        Column("largest friction ratio", "max_friction_ratio", partial(numbers.fixed, decimals=4)),
+        measured("minimum normal impulse", "min_normal_impulse_N_s", partial(numbers.number, digits=4)),
+        Column("largest impulse ratio", "max_impulse_ratio", partial(numbers.fixed, decimals=4)),
+        measured("scuffing depth", "max_scuff_depth_m", lambda depth: numbers.number(numbers.drop_rounding(depth), 4)),
+        Column("residual of the step map", "residual", partial(numbers.power_of_ten, digits=2)),
     ]
     both = len(sets) > 1
     # the corrected set needs a label only next to the printed one
@@ -83,7 +75,7 @@ def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
             yield Column(title, partial(step_value, index, key), written, numeric=True)
     for name in ("step_period", "step_length"):
         words = f"asymmetry of the {name.replace('_', ' ')} (second minus first, over the mean)"
-        yield Column(words, f"asymmetry/{name}", lambda share: f"{fixed(100.0 * share, 2)} %")
+        yield Column(words, f"asymmetry/{name}", lambda share: f"{numbers.fixed(100.0 * share, 2)} %")
 
 
 WORK_SOURCES = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip", "knees": "the knees"}
@@ -129,22 +121,22 @@ def symbol(name: str) -> str:
     match = COORDINATE_NAME.fullmatch(name)
     if match is None:
         return name
-    dot = DOT if match["rate"] else ""
+    dot = numbers.DOT if match["rate"] else ""
     body = f", {match['body'].replace('_', ' ')}" if match["body"] else ""
-    return f"θ{dot}{(match['index'] or '').translate(SUBSCRIPTS)}{body}"
+    return f"θ{dot}{(match['index'] or '').translate(numbers.SUBSCRIPTS)}{body}"
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
     """Format one multiplier of a gait, or a dash if the gait has fewer multipliers."""
     multipliers = multipliers_of(gait)
-    return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
+    return complex_number(*multipliers[place]) if place < len(multipliers) else numbers.NONE
 
 
 def complex_number(real: float, imaginary: float) -> str:
     """Format a multiplier, as in 0.3626 + 0.4603i."""
     if imaginary == 0:
-        return fixed(real, 4)
-    return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"
+        return numbers.fixed(real, 4)
+    return f"{numbers.fixed(real, 4)} {'+' if imaginary > 0 else numbers.MINUS} {numbers.fixed(abs(imaginary), 4)}i"
 
 
 @stage_section("fixedpoint")
@@ -165,8 +157,8 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
     """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
-    four = partial(fixed, decimals=4)
-    five = partial(fixed, decimals=5)
+    four = partial(numbers.fixed, decimals=4)
+    five = partial(numbers.fixed, decimals=5)
     columns = (
         Column("gait", "gait", numeric=True),
         measured("T", "period_s", five),

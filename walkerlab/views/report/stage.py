@@ -20,11 +20,7 @@ from walkerlab.views.report.tables import Table
 
 
 def run(
-    config: Config,
-    inputs: Mapping[str, Stored],
-    progress: Progress,
-    folder: Path,
-    left_out: Sequence[LeftOut] = (),
+    config: Config, inputs: Mapping[str, Stored], progress: Progress, folder: Path, left_out: Sequence[LeftOut] = ()
 ) -> Content:
     """Write the report's pages into the run's folder.
 
@@ -46,10 +42,7 @@ def run(
 
 
 def write_pages(
-    config: Config,
-    inputs: Mapping[str, Stored],
-    folder: Path,
-    left_out: Sequence[LeftOut] = (),
+    config: Config, inputs: Mapping[str, Stored], folder: Path, left_out: Sequence[LeftOut] = ()
 ) -> tuple[tuple[Page, ...], Results]:
     """Write pages of the available results, and remove pages that have no content.
 

@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any, Final, Literal
 
 from walkerlab.labels import add_unit, labels_of, unit_by_name
-from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.files import csv_text
 from walkerlab.views.report.numbers import NONE, number
 
 Tone = Literal["plain", "good", "fair", "bad", "given"]

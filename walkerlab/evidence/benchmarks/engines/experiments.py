@@ -1,22 +1,25 @@
 """Experiments in other engines, compared with our own solution: same law, own law, and a swing without contact.
 
 Under the same law, an engine integrates our contact forces; under its own law, it computes contact by its own model.
+An engine runs in a separate process, so that a crash or hang does not stop the stage.
 """
 
 import math
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from walkerlab.evidence.benchmarks.engines import runs
 from walkerlab.evidence.benchmarks.engines.adapter import Integrator, OwnContact, Stepping
-from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
-from walkerlab.evidence.benchmarks.engines.registry import Engine
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
+from walkerlab.evidence.benchmarks.extension import Engine
 from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
@@ -26,6 +29,73 @@ from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_cont
 from walkerlab.physics.hybrid.contact_state import knees_at_start
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, derivative
+from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerTimeoutError
+
+START_UP_S = 60.0  # extra time for the first task, which loads the engine and compiles
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class TaskLost:
+    """Record of a task without a result."""
+
+    reason: str
+    timed_out: bool = False
+
+
+class OwnProcess:
+    """Runs tasks one after another in a worker process, which is restarted after a crash or time-out.
+
+    The worker's output is suppressed and it has its own folder, since engines print and write logs.
+    """
+
+    def __init__(self) -> None:
+        self._worker: Worker | None = None
+        self._folder = tempfile.TemporaryDirectory(prefix="walkerlab-engine-")
+        self._abandoned = False
+
+    def __enter__(self) -> "OwnProcess":
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._end()
+        self._folder.cleanup()
+
+    def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
+        """Run a picklable task and return its result, or `TaskLost` if it has none.
+
+        Raises RuntimeError after `abandon`.
+        """
+        if self._abandoned:
+            raise RuntimeError("the process was abandoned")
+        if self._worker is None:
+            self._worker = Worker(folder=Path(self._folder.name), quiet=True)
+            timeout_s += START_UP_S
+        try:
+            return self._worker.do(task, timeout_s=timeout_s)
+        except WorkerTimeoutError:
+            self._end()
+            return TaskLost(f"no result within {timeout_s:.0f} s", timed_out=True)
+        except WorkerDiedError as died:
+            self._end()
+            return TaskLost(f"the engine's process ended with code {died.exit_code_of_worker}")
+        except Exception as error:  # an engine's exception is recorded in the row of its run
+            return TaskLost(traceback.format_exception_only(error)[0].strip()[:200])
+
+    def abandon(self) -> None:
+        """Kill the running task and reject further ones. Another thread may call this."""
+        self._abandoned = True
+        worker = self._worker
+        if worker is not None:
+            worker.process.kill()
+
+    def _end(self) -> None:
+        """Kill the process, since an engine may hang."""
+        if self._worker is not None:
+            self._worker.process.kill()
+            self._worker.close()
+            self._worker = None
+
 
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s

@@ -17,7 +17,8 @@ from walkerlab.physics.ground.knees import MIN_FLEXION, lock_knee
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, place_on_ground
-from walkerlab.physics.hybrid import contact_events, contact_state, contact_transitions
+from walkerlab.physics.hybrid import contact_state, contact_transitions
+from walkerlab.physics.hybrid import contact_state as contact_events
 from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.physics.hybrid.contact_state import new_walk_state
 from walkerlab.physics.hybrid.endings import FALLEN_HIP, GOES_ON

@@ -10,13 +10,13 @@ import numpy as np
 
 from walkerlab.evidence.benchmarks.engines.adapter import OwnContact, Simulation, Stepping
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower
-from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
+from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES
 from walkerlab.exchange import planar
 from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_state import steps_with_lift
-from walkerlab.physics.mechanics.assembly import Anchor
+from walkerlab.physics.mechanics.parts import Anchor
 from walkerlab.physics.solvers.system import Floats
 
 TIME_ROUNDING = 1e-9  # relative tolerance for times

@@ -1,8 +1,6 @@
 """Stage `engines`: error against run time with our law in other engines' integrators, then with their
-native contact.
+native contact, for the walkers that engines support.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,21 +10,54 @@ from typing import Any
 import numpy as np
 
 from walkerlab import __version__
-from walkerlab.config.reads import SceneConfig
-from walkerlab.errors import NoAnswer
+from walkerlab.config.reads import ContactConfig, SceneConfig
+from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.engines import experiments
-from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene
-from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
-from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
+from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene, OwnProcess, TaskLost
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
+from walkerlab.evidence.benchmarks.extension import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.words import words
-from walkerlab.exchange.engine_scene import contact_target
+from walkerlab.exchange.engine_scene import EngineScene, contact_target, engine_scene
+from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.labels import labels_of
+from walkerlab.physics.ground.knees import IdealLock
+from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.hybrid.contact_state import knees_at_start
+from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store.content import Content, rows_group
+from walkerlab.scene.contact import knee_rules
+from walkerlab.scene.parts import assembly_of
+
+
+def supported_scene(
+    config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
+) -> EngineScene:
+    """Return a config's scene for engines, see `engine_scene`.
+
+    Raises ConfigError for a walker that other engines do not support.
+    """
+    assembly = assembly_of(config.walker)
+    if assembly.couplings:
+        raise ConfigError(
+            "engines: a torso held on the bisector is a constraint that the engine models do not support.",
+            "Choose a walker without a torso.",
+        )
+    if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
+        raise ConfigError(
+            "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
+        )
+    points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
+    if any(points) and not all(points):
+        raise ConfigError(
+            "engines: a point foot becomes a ball on ground that is lower by its radius, and the other foot is round.",
+            f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
+        )
+    scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)
+    return scene.lock_knees(knees_at_start(scene.ours, STANCE_FOOT, scene.start))
+
 
 RATIO_LEVELS = (1e-3, 1e-5)
 THREE_DIGITS = 5e-4  # relative error
@@ -41,7 +72,7 @@ class EngineFindings:
     tuning: list[TuningRow] = field(default_factory=list)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
-    def add(self, findings: EngineFindings) -> None:
+    def add(self, findings: "EngineFindings") -> None:
         for name in ("rows", "swings", "tuning", "left_out"):
             getattr(self, name).extend(getattr(findings, name))
 

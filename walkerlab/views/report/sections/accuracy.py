@@ -6,17 +6,7 @@ from typing import Any
 
 from walkerlab.labels import join_words
 from walkerlab.outcome import Outcome
-from walkerlab.views.report.blocks import (
-    COSTS,
-    Gallery,
-    PageBlock,
-    Paragraph,
-    Results,
-    Section,
-    Statement,
-    Statements,
-    stage_section,
-)
+from walkerlab.views.report import blocks as page
 from walkerlab.views.report.numbers import NONE, format_integer, number, power_of_ten
 from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import words
@@ -24,25 +14,27 @@ from walkerlab.views.report.words import words
 Row = Mapping[str, Any]
 
 
-@stage_section("accuracy", "reference")
-def section(results: Results, summary: Row) -> Section | None:
+@page.stage_section("accuracy", "reference")
+def section(results: page.Results, summary: Row) -> page.Section | None:
     conclusions = {scene: summary["conclusions"][scene].removeprefix(f"{scene}: ") for scene in summary["reference"]}
-    concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in conclusions.items())
+    concluded = tuple(page.Statement(scene, text[:1].upper() + text[1:]) for scene, text in conclusions.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
     nearest = {scene: run for scene in summary["reference"] if (run := nearest_library(summary, scene))}
     origins = words("accuracy.references", list(summary["reference"].items()), nearest)
-    blocks: tuple[PageBlock, ...] = (
-        Paragraph(words("accuracy.introduction", summary)),
-        Statements(concluded),
+    blocks: tuple[page.PageBlock, ...] = (
+        page.Paragraph(words("accuracy.introduction", summary)),
+        page.Statements(concluded),
         costs(summary),
         table("References", REFERENCE_COLUMNS, references, note=origins),
-        *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
+        *(page.Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
         not_run(summary),
     )
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
         fastest.setdefault(join_words(dict.fromkeys(best.values())), []).append(scene)
-    return Section.create("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
+    return page.Section.create(
+        "accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), page.COSTS
+    )
 
 
 def costs(summary: Row) -> Table:

@@ -7,7 +7,7 @@ import numpy as np
 
 from walkerlab.config.drives import push_offs
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
-from walkerlab.pipeline.store.footholds import ground_levels
+from walkerlab.pipeline.store.content import ground_levels
 from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Results, Section, Walker
 from walkerlab.views.report.tracks import Array, Track, sampling_gap, track_in
 from walkerlab.views.report.words import MODEL_NAMES, WALKED_LABEL, ends, words

@@ -49,10 +49,7 @@ DERIVATIVE_COLUMNS = (
 )
 
 
-OPTIMUM_COLUMNS = (
-    Column("parameter", "to"),
-    Column("best", "best", lambda value: number(value, 7), numeric=True),
-)
+OPTIMUM_COLUMNS = (Column("parameter", "to"), Column("best", "best", lambda value: number(value, 7), numeric=True))
 CONSTRAINT_COLUMNS = (
     Column("quantity", "quantity"),
     Column("minimum", "from", number, numeric=True),

@@ -6,19 +6,9 @@ from typing import Any
 
 from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, RIGID_STAGE
 from walkerlab.physics.energy_channels import CHANNELS
+from walkerlab.views.report import numbers
 from walkerlab.views.report.blocks import Paragraph, Results, Section, stage_section
 from walkerlab.views.report.gaits import WORK_SOURCES
-from walkerlab.views.report.numbers import (
-    NONE,
-    decimals_left,
-    fixed,
-    format_integer,
-    length,
-    number,
-    power_of_ten,
-    quantity,
-    span,
-)
 from walkerlab.views.report.tables import Cell, Column, table
 from walkerlab.views.report.words import MODEL_NAMES, tone, words
 
@@ -41,28 +31,28 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
     work = get("work_per_step_J") or {}
     values: dict[str, str | Cell] = {
         "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
-        "largest penetration": length(get("max_penetration_m")),
-        "static penetration": length(get("static_penetration_m")),
-        "damping ratio": number(get("damping_ratio"), 3),
-        "slip per step": length(get("slip_per_step_m")),
-        "slip in each step": span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
-        "rolling per step": length(get("rolling_per_step_m") or None),
+        "largest penetration": numbers.length(get("max_penetration_m")),
+        "static penetration": numbers.length(get("static_penetration_m")),
+        "damping ratio": numbers.number(get("damping_ratio"), 3),
+        "slip per step": numbers.length(get("slip_per_step_m")),
+        "slip in each step": numbers.span([1e3 * slip for slip in get("slips_m") or ()], "mm", 3),
+        "rolling per step": numbers.length(get("rolling_per_step_m") or None),
         **{f"work of {source}": joules(work[name]) for name, source in WORK_SOURCES.items() if work.get(name)},
-        "speed": quantity(get("speed_m_s"), "m/s", 4),
-        "Froude number": number(get("froude"), 4),
-        "cost of transport": number(get("cost_of_transport"), 4),
+        "speed": numbers.quantity(get("speed_m_s"), "m/s", 4),
+        "Froude number": numbers.number(get("froude"), 4),
+        "cost of transport": numbers.number(get("cost_of_transport"), 4),
         "energy balance error": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in losses.items()},
-        "solver work": format_integer(get("rhs_evaluations")),
+        "solver work": numbers.format_integer(get("rhs_evaluations")),
     }
     meanings = words.terms("walks.meanings", summary)
-    known = {name: value for name, value in values.items() if value != NONE}
+    known = {name: value for name, value in values.items() if value != numbers.NONE}
     return [(name, value, meanings.get(name, meanings["energy lost"])) for name, value in known.items()]
 
 
 def joules(value: float, digits: int = 4) -> str:
     """Format an energy (J) that may be at the level of rounding."""
-    return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
+    return f"{numbers.number(value, digits) if abs(value) >= 1e-3 or value == 0 else numbers.power_of_ten(value, 2)} J"
 
 
 HOLDS = Cell("holds", "good")
@@ -99,14 +89,14 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
     value = summary[key]
     ground = results.config.contact
     if key == "min_normal_force_N":
-        return quantity(value, "N", 4), HOLDS if value > 0 else FAILS
+        return numbers.quantity(value, "N", 4), HOLDS if value > 0 else FAILS
     if key == "max_friction_ratio":
         if ground is None or not ground.has_friction:
-            return number(value, 4), Cell("needs friction", "fair")
-        return number(value, 4), HOLDS if value <= ground.static_friction else FAILS
+            return numbers.number(value, 4), Cell("needs friction", "fair")
+        return numbers.number(value, 4), HOLDS if value <= ground.static_friction else FAILS
     if key == "max_scuff_depth_m":
         seen = value > NEGLIGIBLE * results.config.walker.leg_length_m
-        return length(value if seen else 0.0, 3), NOTED if seen else HOLDS
+        return numbers.length(value if seen else 0.0, 3), NOTED if seen else HOLDS
     return joules(value, 3), HOLDS if value <= NEGLIGIBLE * abs(summary.get("mean_energy_J") or 1.0) else FAILS
 
 
@@ -130,7 +120,7 @@ def steps(results: Results) -> Section | None:
         return None
     every = ((results.summary(stage), key, values) for (stage, key), values in series.items())
     written = [[format_step(index, key, summary) for index in range(len(values))] for summary, key, values in every]
-    numbered = [(index, *step) for index, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
+    numbered = [(index, *step) for index, step in enumerate(zip_longest(*written, fillvalue=numbers.NONE), 1)]
     hidden = len(numbered) - HEAD_STEPS - TAIL_STEPS
     rows = numbered if hidden <= 0 else [*numbered[:HEAD_STEPS], *numbered[-TAIL_STEPS:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[name], numeric=True) for name in series)]
@@ -150,4 +140,4 @@ def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
     errors = summary.get("numerical_error") or {}
     name = ERROR_OF_EACH_STEP[key]
     error = errors["of_steps"][name][place] if name in errors.get("of_steps", ()) else errors.get(name)
-    return fixed(value and factor * value, decimals_left(error and factor * error))
+    return numbers.fixed(value and factor * value, numbers.decimals_left(error and factor * error))
