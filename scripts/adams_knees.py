@@ -1,9 +1,9 @@
-"""Run the ADAMS files of kneed walkers in the tests' reader, and compare with the walks of our contact model.
+"""Run the ADAMS files of kneed walkers in the tests' reader, and compare the walks with those of our contact model.
 
 Usage: python scripts/adams_knees.py [WALKERS, 10 by default] [STRIDES, 3 by default]
 
-Each random walker is exported with `--law functions`; its dataset (.adm) and command file (.acf) are read and run from
-their texts alone. Printed: the largest differences of touch times and of times at which knees lock.
+Each random walker is exported with `--law functions`. The reader runs its dataset (.adm) and command file (.acf) from
+their texts alone. The script prints the largest differences of touch times and of times at which knees lock.
 """
 
 import sys

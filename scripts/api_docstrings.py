@@ -1,6 +1,6 @@
-"""Docstrings as the API reference shows them: arguments that stand in columns become a list, examples a block.
+"""Format docstrings for the API reference: arguments in columns become a list, examples a code block.
 
-An extension of griffe, named in scripts/mkdocs.yml.
+This is an extension of griffe, named in scripts/mkdocs.yml.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ EXAMPLES = re.compile(r"(^>>> .*?)(?=\n\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
 class Columns(Extension):
-    """Rewrites every docstring on its way to the page."""
+    """Reformats every docstring before it is put on a page."""
 
     def on_instance(self, *, obj: Object, **_: Any) -> None:
-        """Rewrite one."""
+        """Reformat the docstring of one object."""
         if obj.docstring is not None:
             obj.docstring.value = as_markdown(obj.docstring.value)
 

@@ -2,8 +2,8 @@
 
     python scripts/benchmark.py [--quick] [--write]
 
-Everything is warm; times are medians. Peers are named with their versions. With --write the table goes into
-docs/performance.md. With --quick each time is the median of fewer repeats.
+Everything is warm, and times are medians. Other programs are named with their versions. With --write the table goes
+into docs/performance.md. With --quick each time is the median of fewer repeats.
 """
 
 from __future__ import annotations
@@ -65,20 +65,20 @@ from walkerlab.scene.scaled import MAP_RTOL
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
 BUDGET = 2_000_000
-PEER_STARTS, PEER_STEPS = 24, 12  # of a basin's starts, walked by a library
+PEER_STARTS, PEER_STEPS = 24, 12  # number of a basin's starts, and of steps from each, that a library simulates
 LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
 PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
 PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 PEER_LEVELS = {"scipy-radau": 2e-6, "scipy-lsoda": 1e-4}
 RADAU_WHERE_BARS_WERE_SET_S = 0.567
-"""What SciPy's Radau took for the contact walk on the machine that the bars in seconds were set on."""
+"""Time of SciPy's Radau for the contact walk on the machine on which the bars in seconds were set."""
 FEW = " Few repeats (--quick)."
 MET, MISSED, STRETCH = "bar met", "bar missed", "stretch met"
 
 
 @dataclass(frozen=True)
 class Line:
-    """One claim: what was done, what it took, and what was aimed at."""
+    """One claim: the work, the measured value, the bar, and the verdict."""
 
     work: str
     measured: str
@@ -88,7 +88,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Timed:
-    """The cheapest run of a method that is exact enough."""
+    """Fastest run of a method that is accurate enough."""
 
     method: str
     tolerance: float
@@ -98,14 +98,14 @@ class Timed:
 
 
 class Stopwatch:
-    """Medians of repeats."""
+    """Measures medians of repeated calls."""
 
     def __init__(self, repeats: int, longest_s: float) -> None:
-        """At most so many repeats, and no more once they have taken so long."""
+        """Set the maximum number of repeats, and the time (s) after which no repeat begins."""
         self.repeats, self.longest_s = repeats, longest_s
 
     def __call__(self, work: Callable[[], Any]) -> float:
-        """Seconds, after one call that is not counted."""
+        """Return the median time (s) of calls, after one call that is not counted."""
         work()
         times: list[float] = []
         while len(times) < self.repeats and (len(times) < 3 or sum(times) < self.longest_s):
@@ -118,7 +118,7 @@ class Stopwatch:
 def cheapest(
     trial: Trial, reference: Reference, method: str, level: float, watch: Stopwatch, ladder: Sequence[float]
 ) -> Timed | None:
-    """A method at the loosest tolerance at which its error is at most `level`; None if there is none."""
+    """Return the run of a method at the loosest tolerance with an error of at most `level`, or None."""
     for tolerance in ladder:
         walk = trial.prepare(method, tolerance, BUDGET)
         run = walk()
@@ -131,7 +131,7 @@ def cheapest(
 
 
 def against(work: str, ours: Timed | None, peer: Timed | None, bar: float, stretch: float) -> Line:
-    """How many times faster we are."""
+    """Build the line that compares our run with another program's."""
     aim = f"{bar:g} x (stretch {stretch:g} x)"
     if ours is None or peer is None:
         who = "we" if ours is None else "the peer"
@@ -142,18 +142,18 @@ def against(work: str, ours: Timed | None, peer: Timed | None, bar: float, stret
 
 
 def spoken(run: Timed) -> str:
-    """A run in words."""
+    """Describe the method, time and error of a run."""
     return f"{run.method} {1e3 * run.seconds:.3g} ms at {run.error:.1e}"
 
 
 def at_most(work: str, value: float, unit: str, bar: float, stretch: float) -> Line:
-    """A number that is to be small."""
+    """Build the line of a value that should be at most a bar."""
     aim = f"{bar:g} {unit} (stretch {stretch:g})"
     return Line(work, f"{value:.3g} {unit}", aim, STRETCH if value <= stretch else MET if value <= bar else MISSED)
 
 
 def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
-    """Ten rigid steps, and how exact they can be."""
+    """Measure ten rigid steps: time at a given error, and smallest error."""
     trial = printed_trial()
     reference = reference_for(trial)
     ours = cheapest(trial, reference, "dop853", 1e-9, watch, LADDER)
@@ -173,14 +173,14 @@ def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
 
 
 def contact_peers(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> dict[str, Timed | None]:
-    """SciPy's stiff solvers on the contact walk, each at an error of its own."""
+    """Time SciPy's stiff solvers on the contact walk, each at an error that it reaches."""
     return {peer: cheapest(trial, reference, peer, level, watch, LADDER[2:]) for peer, level in PEER_LEVELS.items()}
 
 
 def contact_lines(
     trial: ContactTrial, reference: Reference, watch: Stopwatch, peers: dict[str, Timed | None]
 ) -> Iterator[Line]:
-    """The contact walker against SciPy's stiff solvers."""
+    """Compare the contact walk with SciPy's stiff solvers."""
     for (peer, found), bar, stretch in zip(peers.items(), (30, 8), (70, 20), strict=True):
         level = PEER_LEVELS[peer]
         ours = cheapest(trial, reference, "radau5", level, watch, LADDER)
@@ -188,7 +188,7 @@ def contact_lines(
 
 
 def kneed_lines(watch: Stopwatch) -> Iterator[Line]:
-    """What a step of the kneed walker costs against one of the compass at the same error, in both models."""
+    """Compare the time of a step of the kneed walker with that of the compass at the same error, in both models."""
     walkers = (ONE_DEGREE, load(Path("kneed"), ()).config)
     for work, level, method, bar, trial_of in (
         ("rigid step at 1e-9", 1e-9, "dop853", 3.0, rigid_trial_of),
@@ -204,34 +204,34 @@ def kneed_lines(watch: Stopwatch) -> Iterator[Line]:
 
 
 def printed_trial() -> RigidTrial:
-    """Ten steps of the paper's compass at one degree from the start that eq. 11 prints."""
+    """Build the trial of ten steps of the paper's compass at one degree, from the start that eq. 11 prints."""
     walker = rigid_walker(ONE_DEGREE, "corrected")
     start = (-2.0 * walker.slope - PRINTED_START[0], *PRINTED_START)
     return RigidTrial(walker, start, STEPS, compass(ONE_DEGREE, "corrected"))
 
 
 def rigid_trial_of(config: Config) -> RigidTrial:
-    """Ten rigid steps from near the gait of a config."""
+    """Build the trial of ten rigid steps that start near the gait of a config."""
     walker = rigid_walker(config, "corrected")
     start = scale_rates(walker, chosen_gait(config).state, START_RATE_FACTOR, START_RATE_FACTOR)
     return RigidTrial(walker, start, STEPS, compass_or_none(config, "corrected"))
 
 
 def contact_trial_of(config: Config) -> ContactTrial:
-    """Ten steps with the contact of a config from its rigid fixed point."""
+    """Build the trial of ten steps with the contact of a config, from its rigid fixed point."""
     gait = chosen_gait(config)
     return contact_trial(config, tuple(gait.state), gait.step_length, STEPS)
 
 
 def chosen_gait(config: Config) -> RigidGait:
-    """The rigid gait of a config that has one."""
+    """Return the rigid gait of a config that has one."""
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     assert gait is not None, "there is a gait"
     return gait
 
 
 def newton_lines(watch: Stopwatch) -> Iterator[Line]:
-    """From the small-slope seed to the fixed point at 1 degree."""
+    """Time Newton's method from the small-slope seed to the fixed point at 1 degree."""
     search = Search(rigid_walker(ONE_DEGREE, "corrected"))
     seed, slope = seeds(search.walker)[0], float(search.walker.slope)
     looking = map_over_slope(search.walker, SEARCH_TOLERANCES)
@@ -245,7 +245,7 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
 
 
 def family_lines(watch: Stopwatch) -> Iterator[Line]:
-    """Families of gaits over slope: the rigid model's to period 16, and the contact model's to its first flip."""
+    """Time families over slope: the rigid model's up to period 16, the contact model's up to its first flip."""
     config, undoubled = load().config, load(None, ["continuation.periods=1"]).config
     rigid = FamilyQuestion(config, parameter_of("slope_rad", config), ValueSpan(1e-4, 0.1))
     yield at_most("rigid branches to period 16", watch(lambda: branches_of("rigid", rigid)), "s", 5.0, 2.5)
@@ -262,7 +262,7 @@ def branches_of(model: str, asked: FamilyQuestion) -> None:
 
 
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
-    """The two right-hand sides, and what generality costs."""
+    """Compare the right-hand sides, and the assembled one with Appendix A's."""
     typed, rigid, contact = times["Appendix A"], times["rigid"], times["contact"]
     yield at_most("right-hand side, rigid", rigid, "ns", 40, 20)
     yield at_most("right-hand side, contact", contact, "ns", 100, 60)
@@ -271,7 +271,7 @@ def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
 
 
 def batch_lines(watch: Stopwatch) -> Iterator[Line]:
-    """Walks in lanes on one core, and basins of attraction on two."""
+    """Measure walks in lanes on one core, and basins of attraction on two."""
     trial = printed_trial()
     reference = reference_for(trial)
     many = 2_000
@@ -291,7 +291,7 @@ def batch_lines(watch: Stopwatch) -> Iterator[Line]:
 
 
 def basin_line(work: str, bar: float, *sets: str) -> Line:
-    """A basin of the paper's walker at one degree, as the command computes it with two processes, beside SciPy."""
+    """Measure a basin of the paper's walker at one degree, computed by the command with two processes, and by SciPy."""
     with tempfile.TemporaryDirectory() as folder:
         loaded = load(None, ["slope_deg=1", *sets])
         place = RunFolder(Path(folder), loaded.run_name)
@@ -304,7 +304,9 @@ def basin_line(work: str, bar: float, *sets: str) -> Line:
 
 
 def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
-    """Starts of a basin's window that SciPy walks in a second, each for PEER_STEPS steps or to its fall."""
+    """Return how many starts of a basin's window SciPy simulates per second, each for PEER_STEPS steps or until it
+    falls.
+    """
     walker = rigid_walker(config, config.equations)
     script, trial = compass(config, config.equations), contact_trial_of(ONE_DEGREE)
     scene = contact_scene(config, trial.ground.frame.leg_length, trial.ground.frame.leg_length)
@@ -328,7 +330,7 @@ def peer_walks_per_s(config: Config, basin: dict[str, Any]) -> float:
 
 
 def memory_line() -> Line:
-    """What 10,000 strides take more than 100."""
+    """Measure how much more memory 10,000 strides take than 100."""
     trial = printed_trial()
     peaks = []
     for strides in (100, 10_000):
@@ -337,7 +339,7 @@ def memory_line() -> Line:
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     a_step = (peaks[1] - peaks[0]) / (2 * 9_900)
-    # a time and the states before and after each heel strike
+    # each step stores a time and the states before and after its heel strike
     allowed = 8 * (1 + 4 + 4)
     measured = f"{a_step:.0f} bytes a step more, its time and states are {allowed}"
     return Line(
@@ -346,7 +348,7 @@ def memory_line() -> Line:
 
 
 def process_line(repeats: int) -> Line:
-    """What the command line, the config and the results' book-keeping cost a user who types one command."""
+    """Measure the time that command line, config and stored results add for a user who types one command."""
     simulate, bare = whole_process_times(repeats)
     work = "`walkerlab simulate` as a whole process, against one that imports, calls one kernel and writes one file"
     line = at_most(work, simulate / bare, "x", 1.5, 1.2)
@@ -354,7 +356,7 @@ def process_line(repeats: int) -> Line:
 
 
 def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
-    """Error and work with steps that end at the force law's switching points, and without."""
+    """Tabulate error and work with solver steps that end at switching points of the force law, and without."""
     smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_switching=False)))
     rows = []
     for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
@@ -370,13 +372,13 @@ def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> li
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
+    """Format a table in Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
 def environment(radau: Timed | None) -> str:
-    """On what it was measured, and how fast that is: by what SciPy's Radau took for the contact walk."""
+    """Describe the machine, and its speed: the time of SciPy's Radau for the contact walk."""
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
     on = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}, {libraries}."
     if radau is None:
@@ -390,7 +392,7 @@ def environment(radau: Timed | None) -> str:
 
 
 def conclusion(lines: Sequence[Line]) -> str:
-    """How many bars were met, and which were not."""
+    """Count the bars that were met, and list those that were missed."""
     missed = [line.work for line in lines if line.verdict == MISSED]
     met = sum(line.verdict in (MET, STRETCH) for line in lines)
     said = f"{met} of {len(lines)} bars met"
@@ -405,7 +407,7 @@ def all_lines(
     sides: dict[str, float],
     repeats: int,
 ) -> Iterator[Line]:
-    """Every claim, as it is measured."""
+    """Measure every claim in order."""
     yield from rigid_lines(watch)
     yield from kneed_lines(watch)
     yield from newton_lines(watch)
@@ -418,7 +420,7 @@ def all_lines(
 
 
 def main() -> None:
-    """Measure, print, and write if asked to."""
+    """Measure, print, and write the tables if requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer repeats")
     parser.add_argument("--write", action="store_true", help="write the tables into docs/performance.md")

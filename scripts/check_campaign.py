@@ -38,7 +38,7 @@ KINDS = {
     "kneed": (mistaken_knees.MISTAKES, mistaken_knees.step, mistaken_knees.random_knees, mistaken_knees.config_of),
 }
 DIGITS = (4, 6, 10)
-MOST_WALKERS = 25  # to look for gaits with a mistake; some mistakes leave few walkers one
+MOST_WALKERS = 25  # maximum number of walkers to draw; with some mistakes, few walkers have a gait
 
 
 def report(*words) -> None:
@@ -50,7 +50,7 @@ def causes(answer: dict) -> list[str]:
 
 
 def mistaken_gaits(kind: str, place: int, mistake: dict):
-    """Yield random walkers' gaits with a mistake, where they have one."""
+    """Yield gaits of random walkers with a mistake, leaving out walkers that then have none."""
     _, step, make, config_of = KINDS[kind]
     for legs, start in islice(walkers(place, make, config_of), MOST_WALKERS):
         found = gait_with(legs, start, mistake, step)
@@ -67,7 +67,7 @@ def planted(kind: str, count: int, first: int) -> int:
             for digits in DIGITS:
                 answer = answer_to(config, *found, digits)
                 told = causes(answer)
-                # with few digits, several causes may fit
+                # With few digits, several causes may fit.
                 named = any(words in what for what in told) and (digits == min(DIGITS) or len(told) == 1)
                 tally[digits] += named
                 if not named:
@@ -104,7 +104,7 @@ def unlisted(count: int) -> int:
 
 
 def in_conventions(count: int, mistakes: bool) -> int:
-    """Print gaits in random conventions, with a planted mistake or without, and look for them in the answers."""
+    """Print gaits in random conventions, with or without a planted mistake, and look for both in the answers."""
     wrong = 0
     generator = random.Random(300)
     words, mistake = "", {}

@@ -1,11 +1,11 @@
-"""Run sweeps on a real Slurm of one node and on Dask, with jobs and workers that are killed, and check what is left.
+"""Run sweeps on a real Slurm of one node and on Dask, kill jobs and workers, and check the results.
 
     python scripts/clusters.py            # both; takes some minutes
     python scripts/clusters.py --only slurm
 
-Starts munge, slurmctld and slurmd on this machine's loopback interface, without accounting, in a temporary folder, and
-ends them again. Debian: apt-get install slurm-wlm munge; run as root. Without them, or without the extras `slurm` and
-`dask`, says so and leaves that part out. Exits 1 if a check fails.
+The script starts munge, slurmctld and slurmd on this machine's loopback interface, without accounting, in a temporary
+folder, and ends them again. On Debian: apt-get install slurm-wlm munge; run as root. If they or the extras `slurm` and
+`dask` are missing, it says so and skips that part. It exits with 1 if a check fails.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--only", choices=("slurm", "dask"))
     only = parser.parse_args().only
-    # jobs are started by other programs, which hand on nothing but the environment
+    # Jobs are started by other programs, which pass on nothing but the environment.
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(TOY), os.environ.get("PYTHONPATH", ""))))
     sys.path.insert(0, str(TOY))
     warnings.simplefilter("ignore")
@@ -74,7 +74,7 @@ def main() -> int:
 
 
 def checked_on_slurm() -> list[str]:
-    """Names of the checks that failed on Slurm."""
+    """Return the names of the checks that failed on Slurm."""
     missing = [name for name in PROGRAMS if shutil.which(name) is None]
     if missing or os.geteuid() != 0:
         print(f"Slurm is left out: {f'no {missing[0]} (apt-get install slurm-wlm munge)' if missing else 'needs root'}")
@@ -93,7 +93,7 @@ def checked_on_slurm() -> list[str]:
 
 
 def checked_on_dask() -> list[str]:
-    """Names of the checks that failed on Dask."""
+    """Return the names of the checks that failed on Dask."""
     if importlib.util.find_spec("distributed") is None:
         print("Dask is left out: no distributed (pip install 'walkerlab[dask]')")
         return []
@@ -114,7 +114,7 @@ def passes(check: Any) -> bool:
 
 @contextlib.contextmanager
 def slurm_of_one_node() -> Iterator[None]:
-    """Slurm on the loopback interface, for processes that start within the context."""
+    """Run Slurm on the loopback interface, for processes that start in the `with` block."""
     with tempfile.TemporaryDirectory(prefix="slurm-") as name, contextlib.ExitStack() as stack:
         folder = Path(name)
         for below in ("state", "spool"):
@@ -168,7 +168,7 @@ def said(*command: str) -> str:
 
 
 def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.0, **order: Any) -> Any:
-    """Sweep the toy stage whose points can end their process."""
+    """Sweep the toy stage, some of whose points end their process."""
     from toy_sweep.sweep_pipeline import GRAPH
 
     from walkerlab.config.loader import load
@@ -184,7 +184,7 @@ def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.
 
 
 def reasons(sweep: Any) -> dict[int, str]:
-    """Why points are not answered, by seed."""
+    """Return the reason, by seed, why points have no answer."""
     group = sweep.content[""]
     rows = zip(group["seed"].tolist(), group["status"].tolist(), group["reason"].tolist(), strict=True)
     return {seed: reason for seed, status, reason in rows if status != "answered"}
@@ -197,7 +197,7 @@ def a_sweep_is_that_of_this_machine(folder: Path) -> None:
 
 
 def a_time_limit_loses_nothing(folder: Path) -> None:
-    """Jobs of one minute compute what takes two, half a minute of which Slurm keeps for their end."""
+    """Jobs with a limit of one minute compute work of two minutes. Slurm reserves half a minute for their end."""
     os.environ["TOY_SWEEP_PAUSE"] = "3"
     began = time.monotonic()
     try:
@@ -211,7 +211,7 @@ def a_time_limit_loses_nothing(folder: Path) -> None:
 
 
 def a_dead_job_is_noticed(folder: Path) -> None:
-    """Seed 13 kills its job, and Slurm keeps no account of it."""
+    """Seed 13 kills its job, of which Slurm keeps no account."""
     from walkerlab.pipeline.sweeps import engines
 
     assert "disabled" in subprocess.run(["sacct"], capture_output=True, text=True, check=False).stderr
@@ -237,12 +237,12 @@ def a_cancelled_job_is_run_again(folder: Path) -> None:
 
 
 def a_nanny_kills_only_the_greedy_point(folder: Path) -> None:
-    """Seed 29 needs more memory than its worker may have, so that Dask's nanny kills that worker."""
+    """Seed 29 needs more memory than its worker may have, so Dask's nanny kills that worker."""
     import dask
 
     # Dask takes this limit, which Linux ignores, for the memory that its workers share.
     resource.setrlimit(resource.RLIMIT_RSS, (1 << 30, 1 << 30))
-    # a task fails with its first worker, which takes a quarter of the time
+    # Let a task fail when its first worker dies, which takes a quarter of the time.
     dask.config.set({"distributed.scheduler.allowed-failures": 0})
     os.environ["TOY_SWEEP_GREED"] = str(2 << 30)
     try:

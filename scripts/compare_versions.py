@@ -1,15 +1,15 @@
-"""Hold this checkout against another version of the package: its answers, or with --speed what they take.
+"""Compare this checkout with another version of the package: its answers or, with --speed, its run times.
 
     python scripts/compare_versions.py --other CHECKOUT [--only PATTERN] [--jobs N] [--text] [--reference-results DIR]
     python scripts/compare_versions.py --other CHECKOUT --speed [--rounds N]
 
-The other version is a checkout beside this one (--other), or what another Python has installed (--python). Some ninety
-cases are asked of both, each command as a process of its own, each version with its own compiled code: every built-in
-config and type of walker, terrain, law of friction, pinned and free stance, many methods, every outcome, families,
-basins, adjustments, sweeps, and configs that are refused. Compared are exit codes, what `--json` prints, and every
-stored result: names, shapes, units, and values within the tolerances of scripts/differences.py. Left out are times,
-digests, versions and paths. It exits 1 if anything differs. With --reference-results the other version's answers are
-kept in a folder, and asked for once.
+The other version is a checkout (--other), or the package that another Python has installed (--python). Both versions
+run about ninety cases, each command in a process of its own and with the version's own compiled code: every built-in
+config and type of walker, terrain, friction law, pinned and free stance, many methods, every outcome, families, basins,
+adjustments, sweeps, and configs that are refused. The script compares exit codes, the output of `--json`, and every
+stored result: names, shapes, units, and values within the tolerances of scripts/differences.py. It ignores times,
+digests, versions and paths, and exits with 1 if anything differs. With --reference-results the answers of the other
+version are kept in a folder and computed only once.
 """
 
 from __future__ import annotations
@@ -42,28 +42,28 @@ BUILT_IN = (
 WALKS = ("fixedpoint", "simulate", "contact-sim")
 RIGID = ("fixedpoint", "simulate")
 CONTACT = ("contact-sim",)
-RIGID_ALLOWED = 0.01  # of the tolerances: the rigid model is not stiff, and solved a thousand times more exactly
-SHOWN = 12  # differences of a case that are printed
+RIGID_ALLOWED = 0.01  # factor on the tolerances for the rigid model, which is not stiff and so solved more accurately
+SHOWN = 12  # maximum number of differences printed for a case
 
 
 @dataclass(frozen=True)
 class Version:
-    """A version of the package and how it is called."""
+    """A version of the package, and the way to run it."""
 
     name: str
     python: str
-    checkout: Path | None  # None: what its Python has installed
+    checkout: Path | None  # None for the package that its Python has installed
     cache: Path
 
     def environment(self) -> dict[str, str]:
-        """Of its processes."""
+        """Environment of its processes."""
         given = {**os.environ, "WALKERLAB_CACHE": str(self.cache), "COLUMNS": "100"}
         return given | ({"PYTHONPATH": str(self.checkout)} if self.checkout else {})
 
     def sources_digest(self) -> str:
-        """Digest (hex) of the package's sources and built-in configs, wherever they are installed."""
+        """Return the digest (hex) of the package's sources and built-in configs, wherever they are installed."""
         asked = "import walkerlab, pathlib; print(pathlib.Path(walkerlab.__file__).parent)"
-        # where no package lies: Python looks there first
+        # a folder without a package, because Python looks there first
         there = {"cwd": tempfile.gettempdir(), "env": self.environment()}
         package = Path(subprocess.check_output([self.python, "-c", asked], text=True, **there).strip())
         files = [*package.rglob("*.py"), *package.rglob("*.yaml"), *(package.parent / "configs").glob("*.yaml")]
@@ -75,7 +75,7 @@ class Version:
 
 @dataclass(frozen=True)
 class Case:
-    """A config with changes, and the commands that it is given in turn, in a folder of its own."""
+    """A config with changes, and the commands that run on it in turn, in a folder of their own."""
 
     commands: tuple[str, ...]
     config: str
@@ -84,19 +84,19 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Its name, which a folder can have."""
+        """Name of the case, which is valid as a folder name."""
         changes = (re.sub(r"^[\w.]+\.", "", change) for change in self.changes)
         return re.sub(r"[^\w.=@+-]+", "_", "@".join((self.commands[-1], self.config, *changes)))
 
     def lines(self) -> Iterator[list[str]]:
-        """The commands as they are typed."""
+        """Commands as a user types them."""
         changes = [part for change in self.changes for part in ("--set", change)]
         for command in self.commands:
             yield [*command.split(), "-c", self.config, *changes]
 
 
 def cases() -> Iterator[Case]:
-    """All that is compared, what takes longest first."""
+    """Return all cases, those that take longest first."""
     yield from long_cases()
     for name in BUILT_IN:
         yield Case((*WALKS, "compare"), name)
@@ -106,7 +106,7 @@ def cases() -> Iterator[Case]:
 
 
 def long_cases() -> Iterator[Case]:
-    """Families, adjustments, basins, sweeps, extreme cases."""
+    """Yield families, adjustments, basins, sweeps and extreme cases."""
     yield Case(("stability",), "paper", (), 20.0)
     yield Case(("tune",), "paper", ("tune.cells=15",))
     yield Case(("tune",), "kneed", ("tune.cells=5",), 10.0)
@@ -130,13 +130,13 @@ def long_cases() -> Iterator[Case]:
 
 
 def family(config: str, over: str, first: float, last: float, *changes: str) -> Case:
-    """A family of gaits over a span of a key."""
+    """Build the case of a family of gaits over a range of a key."""
     span = (f"continuation.over={over}", f"continuation.from={first}", f"continuation.to={last}")
     return Case(("continuation",), config, (*span, "continuation.points=60", *changes))
 
 
 def rigid_cases() -> Iterator[Case]:
-    """Gaits and walks of the rigid model; steep slopes, starts that fall, walkers and methods of all kinds."""
+    """Yield gaits and rigid walks: steep slopes, starts that fall, and all kinds of walkers and methods."""
     for slope in (0.2, 4.5, 8.0, 40.0):
         yield Case(RIGID, "paper", (f"slope_deg={slope}",))
     yield Case(("fixedpoint",), "kneed", ("slope_deg=12",))
@@ -154,7 +154,7 @@ def rigid_cases() -> Iterator[Case]:
 
 
 def contact_cases() -> Iterator[Case]:
-    """Walks of the contact model: walkers, knees, terrains, stances, laws, methods, outcomes."""
+    """Yield walks of the contact model: walkers, knees, terrains, stances, laws, methods and outcomes."""
     for terrain in ("checkerboard", "after-mid-swing", "plane"):
         for stance in ("free", "pinned"):
             yield Case(CONTACT, "slope-3deg", (f"contact.terrain={terrain}", f"contact.stance={stance}"))
@@ -169,7 +169,7 @@ def contact_cases() -> Iterator[Case]:
         ("slope_deg=8",),
     ):
         yield Case(CONTACT, "paper", changes)
-    # at its limit of stability an explicit method is as exact as its tolerance, not better
+    # At its limit of stability, an explicit method is no more accurate than its tolerance.
     yield Case(CONTACT, "paper", ("solver.contact.method=dop853", "strides=1"), 100.0)
     yield Case(CONTACT, "paper", ("solver.contact.rtol=1e-4", "solver.contact.atol=1e-6"), 100.0)
     for knee in ("lock=compliant", "at_heel_strike=free", "release=touch"):
@@ -186,7 +186,7 @@ def contact_cases() -> Iterator[Case]:
 
 
 def refused_cases() -> Iterator[Case]:
-    """Questions without an answer: refused configs, walkers without a gait."""
+    """Yield questions without an answer: refused configs, and walkers without a gait."""
     for changes in (
         ("walker.leg_masss_kg=3",), ("walker.leg_mass_kg=-3",), ("slope_deg=1", "slope_rad=0.1"),
         ("contact.terrain=grass",), ("start=[1, 2]",), ("solver.contact.method=radau6",), ("strides=0",),
@@ -202,7 +202,7 @@ def refused_cases() -> Iterator[Case]:
 
 
 def answers_of(version: Version, case: Case, folder: Path, text: bool) -> dict[str, Any]:
-    """What a version answers to each command of a case, asked in a folder unless the answers are there already."""
+    """Return the answers of a version to the commands of a case, from the folder if they are there already."""
     asked, kept = [*case.lines(), str(text)], folder / "answers.json"
     if kept.exists():
         told: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
@@ -221,7 +221,7 @@ def answers_of(version: Version, case: Case, folder: Path, text: bool) -> dict[s
 
 
 def answer(version: Version, command: list[str], folder: Path) -> dict[str, Any]:
-    """The exit code and what is printed, without the folder's name; JSON is taken apart."""
+    """Return the exit code and the output, without the folder's name. JSON is parsed."""
     done = subprocess.run(command, capture_output=True, text=True, env=version.environment(), cwd=folder)
     said = [text.replace(str(folder), "FOLDER") for text in (done.stdout, done.stderr)]
     if "--json" in command and said[0].startswith("{"):
@@ -232,19 +232,19 @@ def answer(version: Version, command: list[str], folder: Path) -> dict[str, Any]
 
 
 def as_text(command: str) -> str:
-    """What the answer of a command without `--json` is called."""
+    """Name the answer of a command without `--json`."""
     return f"{command}, as text"
 
 
 def artifacts_in(folder: Path) -> dict[str, Path]:
-    """Stored results by their names, without the digests in these; pieces that results are merged of are none."""
+    """Return stored results by name, without digests in the names and without chunks of merged results."""
     files = sorted((folder / "runs").rglob("*.h5"))
     named = {re.sub(r"-[0-9a-f]{8}\b", "", str(file.relative_to(folder / "runs"))): file for file in files}
     return {name: file for name, file in named.items() if "sweep-chunks" not in name}
 
 
 def differences_in(case: Case, answers: Sequence[dict[str, Any]], folders: Sequence[Path]) -> Iterator[Difference]:
-    """All that is not the same in two versions' answers to a case, however little."""
+    """List all differences between the answers of two versions to a case, however small."""
     for command in case.lines():
         allowed = case.looser * (RIGID_ALLOWED if command[0] in RIGID else 1.0)
         for asked in (command[0], as_text(command[0])):
@@ -257,7 +257,7 @@ def differences_in(case: Case, answers: Sequence[dict[str, Any]], folders: Seque
 
 
 def verdict(case: Case, found: list[Difference], allow_new: bool) -> bool:
-    """Print how a case compares; whether it differs."""
+    """Print how the answers to a case compare, and return whether they differ."""
     found.sort(key=lambda one: (-one.share, one.name))
     wrong = [one for one in found if one.share > 1.0 and not (allow_new and one.words == NEW)]
     nearest = f", nearest {found[0].name}: {found[0].share:.1g} of what is allowed" if found and not wrong else ""
@@ -270,7 +270,7 @@ def verdict(case: Case, found: list[Difference], allow_new: bool) -> bool:
 
 
 def compare(versions: Sequence[Version], chosen: Sequence[Case], places: Sequence[Path], options: Any) -> int:
-    """Ask both versions all cases, and print what differs; in how many cases something does."""
+    """Run all cases with both versions and print the differences. Return the number of cases that differ."""
     with ThreadPoolExecutor(options.jobs) as pool:
 
         def ask(case: Case) -> list[Future[dict[str, Any]]]:
@@ -287,7 +287,10 @@ def compare(versions: Sequence[Version], chosen: Sequence[Case], places: Sequenc
 
 
 def reference_folder(folder: Path, version: Version) -> Path:
-    """The folder of a version's answers; refused if it holds another's."""
+    """Return the folder of a version's answers.
+
+    Exits if it contains those of another version.
+    """
     mark, digest = folder / "sources-digest", version.sources_digest()
     if mark.exists() and mark.read_text() != digest:
         sys.exit(f"{folder} holds the answers of other sources than {version.name}: remove it, or name another folder")
@@ -297,7 +300,7 @@ def reference_folder(folder: Path, version: Version) -> Path:
 
 
 def two_versions(options: Any) -> tuple[Version, Version]:
-    """The other version, and this checkout."""
+    """Return the other version and this checkout."""
     kept = Path(tempfile.gettempdir()) / "walkerlab-versions"
     other = options.other.resolve() if options.other else None
     called = f"{other or options.python}"
@@ -307,17 +310,24 @@ def two_versions(options: Any) -> tuple[Version, Version]:
 
 
 def main() -> None:
-    """Compare two versions, their answers or their speed."""
+    """Compare the answers or the speed of two versions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--other", type=Path, help="its checkout; default: what --python has installed")
+    parser.add_argument(
+        "--other", type=Path, help="checkout of the other version; default: the package that --python has installed"
+    )
     parser.add_argument("--python", default=sys.executable, help="the other version's Python; default: this one")
     parser.add_argument("--only", default="", help="regular expression that the name of a case or figure contains")
     parser.add_argument("--jobs", type=int, default=2, help="commands at once; default: 2")
-    parser.add_argument("--text", action="store_true", help="compare what the terminal shows too")
-    parser.add_argument("--allow-new", action="store_true", help="what only this checkout has is no difference")
-    parser.add_argument("--reference-results", type=Path, metavar="DIR", help="where the other's answers are kept")
-    parser.add_argument("--list", action="store_true", help="print the cases, and ask nothing")
-    parser.add_argument("--speed", action="store_true", help="compare what it takes instead, one command at a time")
+    parser.add_argument("--text", action="store_true", help="also compare what the terminal shows")
+    parser.add_argument("--allow-new", action="store_true", help="ignore what only this checkout has")
+    parser.add_argument(
+        "--reference-results",
+        type=Path,
+        metavar="DIR",
+        help="folder in which the answers of the other version are kept",
+    )
+    parser.add_argument("--list", action="store_true", help="print the cases without running them")
+    parser.add_argument("--speed", action="store_true", help="compare run times instead, one command at a time")
     parser.add_argument("--rounds", type=int, default=3, help="with --speed: measurements of each; default: 3")
     options = parser.parse_args()
     chosen = [case for case in cases() if re.search(options.only, case.name)]
@@ -325,7 +335,7 @@ def main() -> None:
         print(*(case.name for case in chosen), sep="\n")
         return
     if not options.other and options.python == sys.executable:
-        parser.error("--other or --python says which version to compare with")
+        parser.error("name the version to compare with by --other or --python")
     versions = two_versions(options)
     if options.speed:
         print_speed(versions, options.only, options.rounds)

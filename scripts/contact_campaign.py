@@ -50,26 +50,26 @@ import plain_walk
 from walkerlab.config.drives import push_offs
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import Kneed, second_of
+from walkerlab.config.walkers import Kneed, second_leg_of
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.contact_loop import EVENT_TIME
 from walkerlab.physics.hybrid.contact_result import RESIDUAL_FACTOR, ContactWalkResult
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-TIMES = 5.0  # the numerical error that walks may differ by
-TIGHTER = (1.0, 1e-2, 1e-4)  # than the config's tolerances
+TIMES = 5.0  # walks may differ by this multiple of their numerical errors
+TIGHTER = (1.0, 1e-2, 1e-4)  # factors on the config's tolerances
 BALANCED = 5.0  # residual of an energy balance over rtol x (energy + work exchanged); fails at RESIDUAL_FACTOR
 BUDGET = 5_000_000
 PLAIN_STEPS_S = (4e-5, 5e-6)  # the second for walks that seem to differ with the first
-PLANE_MEASURE_M = 0.45  # what steps on ground without pads are judged by
+PLANE_MEASURE_M = 0.45  # reference length for judging steps on ground without pads
 TERRAINS = {
     "checkerboard": plain_walk.CHECKERBOARD,
     "after-mid-swing": plain_walk.AFTER_MID_SWING,
     "plane": plain_walk.PLANE,
 }
-RATIOS = (0.05, 0.3, 1.0, 3.0)  # of damping to critical damping
-LIGHT = (0.02, 0.04, 0.07, 0.12, 0.2, 0.3, 0.4)  # of feet that bounce
+RATIOS = (0.05, 0.3, 1.0, 3.0)  # ratios of damping to critical damping
+LIGHT = (0.02, 0.04, 0.07, 0.12, 0.2, 0.3, 0.4)  # the same for feet that bounce
 SINKS_MM = (0.001, 0.01, 0.06, 0.06, 0.2, 1.0)  # static penetrations
 # of every nine seeds: knees on ground that is damped far above critically from the first touch on, and so lets a foot
 # go while it is still inside; the instant of its lift is hard to hit there
@@ -87,12 +87,12 @@ Quantities = dict[str, Any]  # arrays by the names above
 
 @dataclass(frozen=True)
 class Drawn:
-    """A walk to be compared: a built-in config, what is changed of it, and a start of the rigid model."""
+    """A walk to compare: a built-in config, changes of it, and a start of the rigid model."""
 
     base: str
     sets: tuple[str, ...]
     start: tuple[float, ...]
-    heights_m: tuple[float, ...] = (0.0,)  # of footholds, the start's first
+    heights_m: tuple[float, ...] = (0.0,)  # heights of the footholds, beginning with that of the start
 
     @property
     def ground(self) -> str:
@@ -103,7 +103,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Judged:
-    """A walk at one tolerance against the plain one: by quantity how far apart, and how far they may be."""
+    """A walk at one tolerance, compared with the plain one: differences and allowed differences by quantity."""
 
     tighter: float
     outcome: str
@@ -112,25 +112,25 @@ class Judged:
 
     @cached_property
     def wrong(self) -> list[str]:
-        """The quantities that differ by more."""
+        """Names of the quantities that differ by more than allowed."""
         return [name for name, apart in self.apart.items() if not apart <= TIMES * self.error[name]]
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One drawn walk by both."""
+    """A drawn walk, computed both ways."""
 
     drawn: Drawn
     expected: str
     steps: int
     judged: tuple[Judged, ...]
-    kept: float  # how much the steps' times and the end change from the default tolerance to the next, s
-    residuals: tuple[float, ...]  # of our walks' energy balances, over rtol times energy and work exchanged
-    evaluations: int  # of the right-hand side, at the default tolerances
+    kept: float  # s, change of step times and end time from the default tolerance to the next one
+    residuals: tuple[float, ...]  # residuals of the energy balances, over rtol times energy and exchanged work
+    evaluations: int  # number of right-hand sides at the default tolerances
 
     @property
     def wrong(self) -> list[str]:
-        """What differs."""
+        """Descriptions of all differences."""
         ends = [f"{one.outcome}, plainly {self.expected}" for one in self.judged if one.outcome != self.expected]
         unbalanced = [
             f"energy balance at {tighter:g}"
@@ -141,11 +141,11 @@ class Compared:
 
 
 def compass(seed: int, ratios: tuple[float, ...] = RATIOS) -> Drawn:
-    """The paper's walker, changed."""
+    """Draw a variation of the paper's walker."""
     die = random.Random(seed)
     slope = die.choice((0.3, 0.7, 1.0, 1.0, 2.0, 2.8, 4.0))
     exponent = die.choice((1.0, 1.3, 1.5, 2.2, 2.2, 3.0))
-    # by how much a foot sinks in, so that every exponent gets a ground to walk on
+    # The depth to which a foot sinks is drawn, so that the ground carries the walker for every exponent.
     depth_mm = die.choice(SINKS_MM)
     stiffness = 196.0 / depth_mm**exponent
     ratio = die.choice(ratios)
@@ -179,7 +179,7 @@ def compass(seed: int, ratios: tuple[float, ...] = RATIOS) -> Drawn:
 
 
 def kneed(seed: int, ratios: tuple[float, ...] = RATIOS[1:]) -> Drawn:
-    """A walker with knees of drawn limbs, on ground that carries its weight alike."""
+    """Draw a walker with knees, on ground that suits its weight."""
     die = random.Random(seed)
     thigh, shank, hip = die.uniform(0.3, 0.8), die.uniform(0.03, 0.2), die.uniform(0.2, 1.0)
     weight = 9.81 * (2.0 * (thigh + shank) + hip)
@@ -218,17 +218,19 @@ def kneed(seed: int, ratios: tuple[float, ...] = RATIOS[1:]) -> Drawn:
 
 
 def both(seed: int) -> Drawn:
-    """Every third walker has knees."""
+    """Draw a walker, every third one with knees."""
     return kneed(seed) if seed % 3 == 2 else compass(seed)
 
 
 def light(seed: int) -> Drawn:
-    """The same on ground that is lightly damped, where feet bounce and the clipped force lets go again and again."""
+    """Draw a walker on lightly damped ground, on which feet bounce and the clipped force vanishes again and again."""
     return kneed(seed, LIGHT) if seed % 3 == 2 else compass(seed, LIGHT)
 
 
 def driven(seed: int) -> Drawn:
-    """The same with a spring, a damper and a torque between the legs, as the weight is; every other pushes off."""
+    """Draw a walker with a spring, a damper and a torque between the legs, in proportion to its weight. Every other one
+    pushes off.
+    """
     one, die = both(seed), random.Random(seed)
     weight = 1.0 if one.base == "paper" else 0.08
     keys = {"spring_N_m_per_rad": (0.0, 20.0), "damping_N_m_s_per_rad": (0.0, 0.5), "torque_N_m": (-1.0, 2.0)}
@@ -239,16 +241,17 @@ def driven(seed: int) -> Drawn:
 
 
 def uneven(seed: int) -> Drawn:
-    """The same, every other driven, over footholds of drawn heights: from a tenth to ten thousandths of a leg."""
+    """Draw a walker, every other one driven, on footholds of random heights from a tenth to 1e-4 of a leg."""
     one, die = (driven if seed % 2 else both)(seed), random.Random(seed)
     share = die.choice((1e-1, 1e-2, 1e-3, 1e-3, 1e-4))
     return replace(one, heights_m=(0.0, *(die.gauss(0.0, share) for _ in range(4))))
 
 
 def passing(seed: int) -> Drawn:
-    """The uneven ones on planes, started too slowly to vault: the feet pass again while they stand in the ground.
+    """Draw a walker on uneven planes, started too slowly to pass upright, so that its feet pass again inside the
+    ground.
 
-    Mostly on points, which come down on each other as the feet pass.
+    Most have point feet, which come down on each other as they pass.
     """
     one, die = uneven(seed), random.Random(seed)
     angles, rates = np.array(one.start).reshape(2, -1)
@@ -262,10 +265,14 @@ def passing(seed: int) -> Drawn:
 
 
 def unequal(seed: int) -> Drawn:
-    """The uneven ones, all driven, with a second leg of its own dimensions, masses and push-off."""
+    """Draw a driven walker on uneven ground, whose second leg has other dimensions, masses and push-off."""
     one, die = replace(driven(seed), heights_m=uneven(seed).heights_m), random.Random(seed)
     walker = load(Path(one.base), one.sets).config.walker
-    near = {"leg_length_m": 3e-3, "length_m": 3e-3, "foot_radius_m": 0.2}  # shares of a value, others by 0.1
+    near = {
+        "leg_length_m": 3e-3,
+        "length_m": 3e-3,
+        "foot_radius_m": 0.2,
+    }  # largest relative changes; 0.1 for all other keys
 
     def beside(block: Any, *names: str) -> str:
         shares = ((name, die.uniform(-1.0, 1.0) * near.get(name, 0.1)) for name in names)
@@ -288,7 +295,7 @@ def unequal(seed: int) -> Drawn:
 
 
 def explicit(seed: int) -> Drawn:
-    """The lightly damped ones by dop853, whose long steps of high order the energy balance has to follow."""
+    """Draw a walker on lightly damped ground for dop853, whose energy balance has to follow long high-order steps."""
     one = light(seed)
     return replace(one, sets=(*one.sets, "solver.contact.method=dop853"))
 
@@ -300,12 +307,12 @@ WALKERS = {
 
 
 def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) -> plain_walk.Plain:
-    """The same walker and ground for the plain integration."""
+    """Build the same walker and ground for the plain integration."""
     walker, contact = config.walker, config.contact
     assert contact is not None, "drawn with one"
     si = contact.to_si()
     smooth = contact.friction == "none"
-    legs = plain_walk.replace_second_leg(plain_legs(walker), plain_legs(second_of(walker)))
+    legs = plain_walk.replace_second_leg(plain_legs(walker), plain_legs(second_leg_of(walker)))
     return plain_walk.Plain(
         *legs, walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
         si.exponent, si.damping, si.full_damping_penetration, 0.0 if smooth else si.static_friction,
@@ -316,7 +323,7 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
 
 
 def plain_legs(walker: Any) -> tuple[Any, ...]:
-    """Masses, levers, inertias and feet of a compass, or of a walker with knees."""
+    """Return masses, levers, inertias and feet of a compass, or of a walker with knees."""
     if not isinstance(walker, Kneed):
         return plain_walk.straight_legs(
             walker.leg_length_m, walker.foot_to_mass_m, walker.leg_mass_kg, walker.hip_mass_kg, walker.foot_radius_m,
@@ -330,12 +337,12 @@ def plain_legs(walker: Any) -> tuple[Any, ...]:
 
 
 def at_touch(walker: Any) -> bool:
-    """Whether the trailing knee is released at the other foot's first touch."""
+    """Whether the trailing knee is released at the first touch of the other foot."""
     return isinstance(walker, Kneed) and walker.knee.release == "touch"
 
 
 def plainly(scene: plain_walk.Plain, start: Any, pinned: bool, steps: int, step_s: float) -> plain_walk.Walked:
-    """The plain walk."""
+    """Return the walk of the plain integration."""
     # the rigid model's stance leg is one body, whose angle and rate come second
     angles, rates = np.array(start).reshape(2, -1)
     straight = [0, 1] if angles.size == 2 else [0, 1, 2, 1]
@@ -344,14 +351,16 @@ def plainly(scene: plain_walk.Plain, start: Any, pinned: bool, steps: int, step_
 
 
 def of_plain(plain: plain_walk.Plain, walk: plain_walk.Walked) -> Quantities:
-    """What is compared of the plain walk."""
+    """Return the compared quantities of the plain walk."""
     times = np.concatenate((walk.times, walk.locks[: walk.times.size], [walk.end_s]))
     energy = plain_walk.energy(plain, walk.ground, walk.levels, walk.end)
     return dict(zip(UNITS, (times, walk.places, walk.slips, walk.rolled, walk.lost, np.array([energy])), strict=True))
 
 
 def of_ours(plain: plain_walk.Plain, plainly: plain_walk.Walked, walk: ContactWalkResult) -> Quantities:
-    """What is compared of ours; the energy is the plain formula's, on the ground of the plain walk's end."""
+    """Return the compared quantities of our walk. Its energy is that of the plain formula, on the ground of the plain
+    walk's end.
+    """
     times = np.concatenate((walk.touch_time_s, walk.knee_strikes_s, [walk.end_time_s]))
     lost = walk.dissipated_J[: len(plain_walk.CHANNELS)]
     energy = plain_walk.energy(
@@ -362,9 +371,9 @@ def of_ours(plain: plain_walk.Plain, plainly: plain_walk.Walked, walk: ContactWa
 
 
 def rounding(plain: plain_walk.Plain, rounds: int) -> dict[str, float]:
-    """What rounding alone makes of each quantity: that of every step of the plain integration, adding up at worst.
+    """Return the largest effect of rounding on each quantity: that of every step of the plain integration, added up.
 
-    Events are located to a time; meanwhile the walker moves on by that share of a pendulum time, in its own units.
+    Events are located to a time. Meanwhile the walker moves on by that fraction of a pendulum time, in its own units.
     """
     tau, weight = (plain.leg / plain.gravity) ** 0.5, plain.gravity * plain.masses.sum()
     share = rounds * np.finfo(float).eps + EVENT_TIME / tau
@@ -373,7 +382,7 @@ def rounding(plain: plain_walk.Plain, rounds: int) -> dict[str, float]:
 
 
 def scene_of(drawn: Drawn) -> tuple[Config, ContactScene]:
-    """What is walked."""
+    """Build the scene of a drawn walk."""
     config = load(Path(drawn.base), drawn.sets).config
     assert config.contact is not None, "drawn with one"
     pitch = config.contact.pad_pitch
@@ -381,7 +390,7 @@ def scene_of(drawn: Drawn) -> tuple[Config, ContactScene]:
 
 
 def ours_at(scene: ContactScene, config: Config, drawn: Drawn, steps: int, tighter: float) -> ContactWalkResult:
-    """Our walk with the config's tolerances, or tighter ones."""
+    """Return our walk at the config's tolerances, or at tighter ones."""
     settings = config.solver.contact
     tolerances = Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, BUDGET)
     heights = np.array(drawn.heights_m) if len(drawn.heights_m) > 1 else None
@@ -389,9 +398,9 @@ def ours_at(scene: ContactScene, config: Config, drawn: Drawn, steps: int, tight
 
 
 def compare(drawn: Drawn, steps: int) -> Compared:
-    """Walk a drawn walk both ways.
+    """Compute a drawn walk both ways.
 
-    One that differs is judged again with a shorter plain step, since halving may change little by luck.
+    A walk that differs is judged again with a shorter plain step, since halving may change little by luck.
     """
     long, short = PLAIN_STEPS_S
     one = compare_with(long, drawn, steps)
@@ -399,7 +408,7 @@ def compare(drawn: Drawn, steps: int) -> Compared:
 
 
 def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
-    """Walk a drawn walk both ways, plainly with steps of step_s at most and of half of it."""
+    """Compute a drawn walk both ways, with plain steps of at most `step_s` and of half of it."""
     (config, scene), start = scene_of(drawn), drawn.start
     plain, pinned = plain_scene(config, scene.pitch_m, drawn.heights_m), scene.pinned
     coarse, fine = (plainly(plain, start, pinned, steps, h) for h in (step_s, 0.5 * step_s))
@@ -427,23 +436,23 @@ def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
 
 
 def apart(one: Quantities, other: Quantities) -> dict[str, float]:
-    """Largest difference by quantity; of rows of different length, infinite."""
+    """Return the largest difference by quantity, or infinity for rows of different length."""
     return {name: largest(one[name], other[name]) for name in UNITS}
 
 
 def largest(one: Any, other: Any) -> float:
-    """Largest difference of two rows of numbers."""
+    """Return the largest difference between two rows of numbers."""
     return float(np.max(np.abs(one - other), initial=0.0)) if one.size == other.size else float("inf")
 
 
 def spread(numbers: list[float]) -> str:
-    """Median, 90 % and largest."""
+    """Format the median, the 90 % quantile and the maximum."""
     median, most, largest = np.quantile(numbers, (0.5, 0.9, 1.0))
     return f"{median:.2g} (median), {most:.2g} (90 %), {largest:.2g} (largest)"
 
 
 def arguments(about: str | None, walks: int, steps: int) -> argparse.Namespace:
-    """Which walks are asked for, and how long ones, of a script about something."""
+    """Parse the selection and length of walks, for a script with the description `about`."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--walker", choices=tuple(WALKERS), default="both")
     parser.add_argument("--walks", type=int, default=walks)
@@ -453,12 +462,12 @@ def arguments(about: str | None, walks: int, steps: int) -> argparse.Namespace:
 
 
 def walks_of(chosen: argparse.Namespace) -> Iterator[tuple[int, Drawn]]:
-    """The walks that are asked for, with their seeds."""
+    """Yield the selected walks with their seeds."""
     return ((seed, WALKERS[chosen.walker](seed)) for seed in range(chosen.seed, chosen.seed + chosen.walks))
 
 
 def tell_row(*cells: object) -> None:
-    """A row of a table in Markdown."""
+    """Print a row of a table in Markdown."""
     print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
 
 
@@ -489,7 +498,7 @@ def main() -> None:
 
 
 def tell_spreads(right: list[Compared]) -> None:
-    """How much the default tolerances err, and how well the energy balances."""
+    """Print the errors at the default tolerances and the residuals of the energy balance."""
     print("at the default tolerances times err by (s)", spread([one.kept for one in right]))
     for number, tighter in enumerate(TIGHTER):
         residuals = [one.residuals[number] for one in right]

@@ -1,6 +1,6 @@
 """Cut recordings of a walk at random beginnings and ends, and count the heel strikes that are missed or invented.
 
-The walk is the built-in compass walker's. Its strikes are known, because the simulation states them.
+The walk is that of the built-in compass walker, whose heel strikes are known from the simulation.
 
     python scripts/crop_campaign.py [COUNT] [SEED]
 """
@@ -25,7 +25,7 @@ FRAME_RATES = (25.0, 30.0, 50.0, 60.0, 100.0, 120.0, 240.0, 1000.0)  # frames/s
 NOISES_DEG = (0.0, 0.01, 0.05, 0.1)
 NEAR_S = 0.02  # half of the cuts are this near to a heel strike
 STRIKES_S = PERIOD_S * np.arange(9)
-MARGIN_S = 0.03  # strikes nearer to an end may be found or not
+MARGIN_S = 0.03  # strikes nearer to an end are not counted
 
 
 class Crop(NamedTuple):
@@ -37,7 +37,7 @@ class Crop(NamedTuple):
 
 
 class Count(NamedTuple):
-    """Outcome of a crop."""
+    """Result of reading a crop."""
 
     missed: int
     invented: int

@@ -1,10 +1,10 @@
-"""Ten rigid steps by CyRK, whose integrators, dense output and events are compiled C++, beside walkerlab's.
+"""Time ten rigid steps in CyRK, whose integrators, dense output and events are compiled C++, and in walkerlab.
 
     pip install CyRK==0.20.0 && python scripts/cyrk_peer.py
 
-Both get a compiled right-hand side. CyRK gets it as a function of numba, called through Python as are its events; the
-impact is a function of Python. Each method runs at the loosest tolerance, in half decades, whose end state is right to
-1e-9 rad and rad/s. Printed are medians of processor times, their ratio, and the errors.
+Both use a compiled right-hand side. CyRK gets it as a function of numba, which is called through Python, as are its
+events. The impact is a Python function. Each method runs at the loosest tolerance, in half decades, whose end state is
+correct to 1e-9 rad and rad/s. The script prints medians of processor times, their ratio, and the errors.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Ways to damage a stored result: by accident, and on purpose under a seal that is right again."""
+"""Ways to damage a stored result: accidental ones, and deliberate ones with a new valid seal."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ HOSTILE = ("<script>alert(1)</script>", "../../x", "\x1b[2J", "9" * 10_000, "nan
 
 
 def cut(drawn: random.Random, data: bytes) -> bytes:
-    """Cut short."""
+    """Cut the file short."""
     return data[: drawn.randrange(len(data))]
 
 
 def flip(drawn: random.Random, data: bytes) -> bytes:
-    """A bit flipped."""
+    """Flip a bit."""
     changed = bytearray(data)
     changed[drawn.randrange(len(data))] ^= 1 << drawn.randrange(8)
     return bytes(changed)
 
 
 def overwrite(drawn: random.Random, data: bytes) -> bytes:
-    """A block of noise or zeros."""
+    """Overwrite a block with noise or zeros."""
     changed, at = bytearray(data), drawn.randrange(len(data))
     length = min(drawn.randrange(1, 4096), len(data) - at)
     changed[at : at + length] = drawn.randbytes(length) if drawn.random() < 0.5 else bytes(length)
@@ -37,12 +37,12 @@ def overwrite(drawn: random.Random, data: bytes) -> bytes:
 
 
 def replace_all(drawn: random.Random, data: bytes) -> bytes:
-    """Another file altogether."""
+    """Replace the whole file."""
     return drawn.choice((b"", b"\x89HDF\r\n\x1a\n", b"text\n", drawn.randbytes(len(data))))
 
 
 def forge(drawn: random.Random, data: bytes) -> bytes:
-    """Altered with HDF5's own tools, and sealed again."""
+    """Alter the content with HDF5's own tools, and seal it again."""
     place = io.BytesIO(data[:-SEAL_BYTES])
     with h5py.File(place, "r+") as file:
         drawn.choice(ALTERATIONS)(drawn, file)
@@ -51,14 +51,14 @@ def forge(drawn: random.Random, data: bytes) -> bytes:
 
 
 def datasets(file: h5py.File) -> list[str]:
-    """Paths of all arrays."""
+    """Return the paths of all arrays."""
     found: list[str] = []
     file.visititems(lambda name, node: found.append(name) if isinstance(node, h5py.Dataset) else None)
     return sorted(found)
 
 
 def reshape(drawn: random.Random, file: h5py.File) -> None:
-    """An array of another shape."""
+    """Give an array another shape."""
     name = drawn.choice(datasets(file))
     shape = tuple(size + drawn.randrange(1, 4) for size in file[name].shape) or (2,)
     del file[name]
@@ -66,7 +66,7 @@ def reshape(drawn: random.Random, file: h5py.File) -> None:
 
 
 def change_number(drawn: random.Random, file: h5py.File) -> None:
-    """One number of an array is another, or none."""
+    """Replace one number of an array, possibly by NaN."""
     name = drawn.choice([name for name in datasets(file) if file[name].dtype.kind == "f" and file[name].size])
     values = file[name][()]
     values.flat[drawn.randrange(values.size)] = drawn.choice((np.nan, np.inf, -1e308, drawn.random()))
@@ -74,24 +74,24 @@ def change_number(drawn: random.Random, file: h5py.File) -> None:
 
 
 def change_version(drawn: random.Random, file: h5py.File) -> None:
-    """Of another layout."""
+    """Change the version of the layout."""
     file.attrs["schema_version"] = drawn.choice((0, 1, -1, 10**6))
 
 
 def hostile_attribute(drawn: random.Random, file: h5py.File) -> None:
-    """An attribute that says something else."""
+    """Replace an attribute by a hostile value."""
     file.attrs[drawn.choice(sorted(file.attrs))] = drawn.choice(HOSTILE)
 
 
 def declare_huge(drawn: random.Random, file: h5py.File) -> None:
-    """Ten gigabytes declared in a file of a few kilobytes."""
+    """Declare ten gigabytes in a file of a few kilobytes."""
     name = drawn.choice(datasets(file)) + "_more"
     chunks = (1 << 10,) if drawn.random() < 0.5 else None
     file.create_dataset(name, shape=(10 << 27,), dtype="f8", chunks=chunks)
 
 
 def take_away(drawn: random.Random, file: h5py.File) -> None:
-    """An array or an attribute is missing."""
+    """Remove an array or an attribute."""
     if drawn.random() < 0.5:
         del file[drawn.choice(datasets(file))]
     else:

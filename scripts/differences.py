@@ -1,4 +1,4 @@
-"""What counts as a difference between two answers: of the program's text, its JSON, and its stored results."""
+"""Decide what counts as a difference between two answers: texts, JSON, and stored results."""
 
 from __future__ import annotations
 
@@ -14,37 +14,39 @@ import numpy as np
 
 
 class Near(NamedTuple):
-    """Numbers agree within a share of the largest of them, or within an absolute difference in SI."""
+    """Rule: numbers agree within a fraction of the largest of them, or within an absolute difference in SI."""
 
     relative: float
     absolute: float
 
 
 class AsLarge(NamedTuple):
-    """Numbers that are rounding or error estimates agree in their order of magnitude alone; below the floor, always."""
+    """Rule: numbers that are rounding or error estimates need only have the same order of magnitude, or be below the
+    floor.
+    """
 
     factor: float
     floor: float
 
 
-# What a quantity is compared by, its path or the last part of that: the first row that fits; None: not at all. Each
-# allows some five times what a change of the equations by one rounding makes of it in scripts/compare_versions.py.
+# Rules by a pattern for the path of a quantity or its last part. The first match counts, and None means no comparison.
+# Each allows about five times the effect that changing the equations by one rounding has in compare_versions.py.
 RULES: tuple[tuple[str, Near | AsLarge | None], ...] = (
-    # when, how long and by which sources: no answer
+    # times, durations and sources are not part of the answer
     (r".*wall.*|.*cpu.*|.*(_per_s|seconds)|(started|ended)_utc|.*_(digests?|keys?)|(package|library)_versions?", None),
     (r"command_line|platform|git_commit|summary_json|DIMENSION_LIST|REFERENCE_LIST", None),
-    # what other solvers make of extreme cases, and shares of budgets, is rounding's to say
+    # Results of other solvers in extreme cases, and used fractions of budgets, depend on rounding.
     (r".*/(ordinary\[\d+\]|measures\[\d+\]/(value|limit)).*", None),
-    # counts of work follow rounding where a step is only just accepted
+    # Counts of work depend on rounding if a step is only just accepted.
     (r"rejected.*", Near(0.1, 20.0)),
     (r".*(evaluations|accepted|jacobians|newton|solves|iterations).*|steps_tried|work", Near(0.04, 10.0)),
     (r".*residual.*|.*drift.*|.*rounding.*|.*(step_)?error|.*numerical.*|.*agreement.*", AsLarge(30.0, 1e-8)),
     (r".*lyapunov.*|exponent|.*uncertainty.*|.*attractor.*|.*chaotic.*", Near(0.2, 0.05)),
     # a ratio to a force that goes through zero in a fall
     (r"max_friction_ratio", Near(0.02, 1e-6)),
-    # of the step's derivative, and of searches that end once they are near enough
+    # quantities of the derivative of a step, and of searches that end when they are near enough
     (r".*multiplier.*|.*radius.*|.*derivative.*|.*/orders/.*|.*factor.*|.*margin.*|.*distance.*", Near(1e-5, 1e-6)),
-    # contact is stiff: a force follows its penetration, and velocities jump with it
+    # Contact is stiff, so forces and velocities amplify small differences in penetration.
     (r".*_N|.*penetration.*", Near(3e-5, 1e-5)),
     (r".*velocity.*|.*rate.*|.*slip.*|.*dissipat.*|.*_J", Near(1e-6, 1e-7)),
     (r".*", Near(1e-7, 1e-8)),
@@ -58,21 +60,21 @@ HEX = re.compile(r"\b[0-9a-f]{8,}\b")
 
 @dataclass(frozen=True)
 class Difference:
-    """Two values that are not the same, and how far apart they are in units of what is allowed."""
+    """Two values that differ, and their difference in units of what is allowed."""
 
     name: str
-    share: float  # of what is allowed; inf for NaN
+    share: float  # fraction of the allowed difference; inf for NaN
     words: str
 
 
 def rule_for(name: str) -> Near | AsLarge | None:
-    """What a quantity is compared by, named by its path."""
+    """Return the rule for a quantity, which its path names."""
     last = re.sub(r"(\[\d+\])+$", "", re.split("[/:@]", name)[-1])
     return next(rule for pattern, rule in RULES if re.fullmatch(pattern, name if "/" in pattern else last))
 
 
 def of_values(old: Any, new: Any, name: str, looser: float = 1.0) -> Iterator[Difference]:
-    """Between what JSON can hold; `looser` multiplies every tolerance."""
+    """Yield differences between two JSON values. `looser` multiplies every tolerance."""
     if rule_for(name) is None or (old is None and new is None):
         return
     if isinstance(old, dict) and isinstance(new, dict):
@@ -91,14 +93,18 @@ def of_values(old: Any, new: Any, name: str, looser: float = 1.0) -> Iterator[Di
 
 
 def of_names(old: Any, new: Any, name: str) -> Iterator[Difference]:
-    """Names that only one has."""
+    """Yield names that only one side has."""
     for key in sorted(set(old) ^ set(new)):
         if rule_for(key) is not None:
             yield Difference(f"{name}/{key}", math.inf, GONE if key in old else NEW)
 
 
 def of_texts(old: str, new: str, name: str) -> Iterator[Difference]:
-    """Words are to be the same, but for white space; numbers to the last digit printed; errors, powers of ten, not."""
+    """Yield differences between two texts.
+
+    Words must be equal except for white space, and numbers up to the last printed digit. Errors and powers of ten may
+    differ.
+    """
     texts = [" ".join(HEX.sub("#", POWER_OF_TEN.sub("#", text)).split()) for text in (old, new)]
     words = [NUMBER.sub("#", text) for text in texts]
     if words[0] != words[1]:
@@ -113,12 +119,14 @@ def of_texts(old: str, new: str, name: str) -> Iterator[Difference]:
 
 
 def spoken(number: str) -> float:
-    """A printed number's value."""
+    """Return the value of a printed number."""
     return float(number.replace(",", "").replace("\u2212", "-"))
 
 
 def last_digit(number: str) -> float:
-    """What a printed number's last digit stands for; 0 for a whole one, and what has more digits than can be meant."""
+    """Return the value of one unit of a printed number's last digit, or 0 for whole numbers and for more digits than
+    can be meant.
+    """
     mantissa, _, exponent = number.lower().partition("e")
     decimals = mantissa.partition(".")[2]
     if len(decimals) > 9:
@@ -127,7 +135,7 @@ def last_digit(number: str) -> float:
 
 
 def of_numbers(old: Any, new: Any, name: str, looser: float) -> Iterator[Difference]:
-    """Between arrays."""
+    """Yield differences between two arrays."""
     if old.shape != new.shape:
         yield Difference(name, math.inf, f"shapes {old.shape} and {new.shape}")
         return
@@ -150,7 +158,7 @@ def of_numbers(old: Any, new: Any, name: str, looser: float) -> Iterator[Differe
 
 
 def of_artifacts(old: Path, new: Path, name: str, looser: float = 1.0) -> Iterator[Difference]:
-    """Between two HDF5 files: names, shapes, kinds, attributes (units, long names), values."""
+    """Yield differences between two HDF5 files: names, shapes, types, attributes (units, long names) and values."""
     with h5py.File(old) as one, h5py.File(new) as other:
         items = [dict(everything_in(file)) for file in (one, other)]
         yield from of_names(*items, name)
@@ -167,14 +175,14 @@ def of_artifacts(old: Path, new: Path, name: str, looser: float = 1.0) -> Iterat
 
 
 def everything_in(file: Any) -> Iterator[tuple[str, Any]]:
-    """Every group and dataset of a file by its path, the root included."""
+    """Return every group and dataset of a file by path, the root included."""
     found = [("", file)]
     file.visititems(lambda path, item: found.append((path, item)))
     yield from found
 
 
 def plain(value: Any) -> Any:
-    """A stored value as JSON would have it; text that is JSON is taken apart."""
+    """Convert a stored value to JSON types. Text that is JSON is parsed."""
     if isinstance(value, bytes):
         return value.decode()
     if isinstance(value, np.ndarray) and value.dtype.kind in "OS":
@@ -183,7 +191,7 @@ def plain(value: Any) -> Any:
 
 
 def is_numeric(values: Any) -> bool:
-    """Whether it is a number, or nested lists of numbers in rows of one length."""
+    """Whether a value is a number, or nested lists of numbers in rows of equal length."""
     try:
         return not isinstance(values, str | dict | None) and np.asarray(values).dtype.kind in "fiub"
     except ValueError:
@@ -191,6 +199,6 @@ def is_numeric(values: Any) -> bool:
 
 
 def shortened(value: Any) -> str:
-    """A value in at most sixty characters."""
+    """Format a value in at most sixty characters."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,6 +1,6 @@
-"""Draw the pictures of docs/walkers.md and of the tutorial: the measures of each type of walker, and a state's angles.
+"""Draw the pictures of docs/walkers.md and of the tutorial: the dimensions of each type of walker, and leg angles.
 
-The command `walkerlab draw` draws the measures of your own walker.
+The command `walkerlab draw` draws the dimensions of your own walker.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
 PAGE = ROOT / "docs" / "walkers.md"
 OWN_PARTS = re.compile(r"```yaml\n(name: own-parts\n.*?)```", re.DOTALL)
-# what is zero in a built-in config is given a size, for its measure to be seen
+# Dimensions that are zero in a built-in config get a size, so that they are visible.
 PICTURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "compass": ("paper", ()),
     "straight-legs": ("round-feet", ("walker.leg_mass_ahead_m=0.02", "walker.foot_centre_ahead_m=0.03")),
@@ -32,14 +32,14 @@ PICTURES: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 def pictures() -> dict[str, bytes]:
-    """The pictures of docs/walkers.md, by the name of their file."""
+    """Yield the pictures of docs/walkers.md by file name."""
     found = {
         f"walker-{name}.svg": draw_measures(load(Path(file), sets).config.walker, name)
         for name, (file, sets) in PICTURES.items()
     }
     return {
         **found,
-        "walker-parts.svg": draw_measures(own_parts().walker, "parts"),
+        "walker-parts.svg": draw_measures(config_of_parts().walker, "parts"),
         "walker-angles.svg": draw_angles(),
     }
 
@@ -73,8 +73,8 @@ def draw_angles(swing: float = -0.42, stance: float = 0.22) -> bytes:
         return files_of(figure, "angles", "Leg angles of the compass walker from the vertical", ["svg"])[0]
 
 
-def own_parts() -> Config:
-    """The config that the page describes a walker's parts by."""
+def config_of_parts() -> Config:
+    """Return the config by which the page explains a walker made of parts."""
     example = OWN_PARTS.search(PAGE.read_text(encoding="utf-8"))
     assert example is not None, f"{PAGE} has an example named own-parts"
     with tempfile.TemporaryDirectory() as folder:

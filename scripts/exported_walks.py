@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Integrate exported ADAMS models from their text alone and compare their touches with our walk's.
+"""Integrate exported ADAMS models from their texts alone, and compare the touch times with those of our walk.
 
-Usage: python scripts/exported_walks.py [how many random walkers, 10 by default]
+Usage: python scripts/exported_walks.py [number of random walkers, 10 by default]
 """
 
 import sys

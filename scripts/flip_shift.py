@@ -1,13 +1,14 @@
-"""How the contact model's first flip comes to the rigid model's as its ground creeps less and stiffens.
+"""Measure how the contact model's first flip approaches the rigid model's on ground that creeps less and is stiffer.
 
     python scripts/flip_shift.py [--velocities 100 25 6.25] [--radii 0.001 0.0001 0.00001] [--factors 1 10 100]
                                  [--frictions 0.5 1 2]
 
-The paper's walker over slope. Three series, each from the end of the one before: the stiction velocity falls and the
-friction velocity with it; the ball feet, which roll, shrink to points; the ground stiffens, its damping as k^p
-(--damping) and the penetration of full damping as k^(-1/e). A fourth from the end of the second: friction, with both
-velocities in proportion to it, so that feet creep alike. The observed order comes from the changes between neighbours,
-and so does not hang on what else separates the models.
+The gaits of the paper's walker are followed over slope, in three series, each of which begins where the previous one
+ends. First the stiction velocity falls, and the friction velocity with it. Then the rolling ball feet shrink to points.
+Then the ground stiffens, with damping as k^p (--damping) and the penetration of full damping as k^(-1/e). A fourth
+series begins at the end of the second one: it changes friction and, in proportion, both velocities, so that the creep
+stays equal. The observed order comes from the changes between neighbours, so it does not depend on other differences
+between the models.
 """
 
 from __future__ import annotations
@@ -27,21 +28,21 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
 from walkerlab.scene.parameter import parameter_of
 
-SPAN = ValueSpan(3.9, 4.5)  # deg; holds every flip that is asked for
+SPAN = ValueSpan(3.9, 4.5)  # deg; contains every requested flip
 
 
 class Ground(NamedTuple):
-    """What separates the contact model from the rigid one."""
+    """Properties that separate the contact model from the rigid one."""
 
-    velocity: float  # of stiction, mm/s
-    radius: float  # of the ball feet, m
-    stiffer: float = 1.0  # times the config's stiffness
-    damped: float = 1.0  # times its damping
-    rubbed: float = 1.0  # times its coefficients of friction
+    velocity: float  # stiction velocity, mm/s
+    radius: float  # radius of the ball feet, m
+    stiffer: float = 1.0  # factor on the config's stiffness
+    damped: float = 1.0  # factor on its damping
+    rubbed: float = 1.0  # factor on its coefficients of friction
 
 
 def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
-    """A built-in config's walker on another ground; `more` is set besides, as on the command line."""
+    """Return a built-in config on another ground. `more` are further settings, as on the command line."""
     own = load(Path(of)).config.contact
     assert own is not None, "the config has a contact block"
     changed = {
@@ -58,17 +59,17 @@ def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
 
 
 def question(config: Config) -> FamilyQuestion:
-    """Gaits of one step over the slope."""
+    """Ask for gaits of one step over the slope."""
     return FamilyQuestion(config, parameter_of("slope_deg", config), SPAN)
 
 
 def flip(ground: Ground) -> float:
-    """Where the contact model's gait of one step first doubles its period (deg)."""
+    """Return the slope (deg) at which the contact model's one-step gait first doubles its period."""
     return flip_of("contact", config_of(ground))
 
 
 def flip_of(model: str, config: Config) -> float:
-    """The first flip of a model in the span (deg)."""
+    """Return the first flip of a model in the span (deg)."""
     search = search_of(model, question(config), Silent())
     found = None if search is None else first_flip(search.branches().branches)
     assert found is not None, "the span holds the flip"
@@ -76,9 +77,9 @@ def flip_of(model: str, config: Config) -> float:
 
 
 def rows(name: str, grounds: Sequence[Ground], knob: Sequence[float], rigid: float) -> list[float]:
-    """Print the series as it is computed; returns its flips.
+    """Print a series while it is computed, and return its flips.
 
-    knob  what changes
+    knob  the property that changes
     """
     flips: list[float] = []
     print(f"{name:>24} {'flip (deg)':>12} {'shift (deg)':>12} {'order':>7}")
@@ -93,18 +94,18 @@ def rows(name: str, grounds: Sequence[Ground], knob: Sequence[float], rigid: flo
 
 
 def limit(flips: Sequence[float]) -> float:
-    """Where a series of flips whose changes fall geometrically comes to (deg), by Aitken's formula."""
+    """Return the limit (deg) of a series of flips whose changes fall geometrically, by Aitken's formula."""
     first, second = (b - a for a, b in pairwise(flips[-3:]))
     return flips[-1] + second * second / (first - second)
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print all series."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--velocities", type=float, nargs="+", default=[100.0, 25.0, 6.25], help="mm/s")
     parser.add_argument("--radii", type=float, nargs="+", default=[1e-3, 1e-4, 1e-5], help="m")
     parser.add_argument("--factors", type=float, nargs="+", default=[1.0, 10.0, 100.0], help="of the stiffness")
-    parser.add_argument("--damping", type=float, default=1.0, help="power of the stiffness that the damping goes with")
+    parser.add_argument("--damping", type=float, default=1.0, help="exponent p with which damping grows with stiffness")
     parser.add_argument("--frictions", type=float, nargs="+", default=[0.5, 1.0, 2.0], help="of its coefficients")
     asked = parser.parse_args()
     rigid = flip_of("rigid", load(None, ["continuation.periods=1"]).config)

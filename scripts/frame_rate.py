@@ -1,9 +1,9 @@
-"""How smoothly the page's player moves: frames a second in headless Chromium, and the work of one.
+"""Measure how smoothly the page's player moves in headless Chromium: frames per second, and the work for a frame.
 
     python scripts/frame_rate.py runs/paper/report.html [--seconds 5]
 
-Plays the walk with all of its views, and states the frames drawn a second, the longest wait for one, and how long the
-page's own script takes for one. `CHROMIUM` names a browser that is elsewhere.
+The script plays the walk with all of its views. It prints the number of frames drawn per second, the longest wait for a
+frame, and how long the page's script takes for one. `CHROMIUM` names a browser in another place.
 """
 
 from __future__ import annotations

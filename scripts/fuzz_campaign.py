@@ -1,12 +1,13 @@
-"""Fuzzed configs and damaged results: never a traceback, never a hang, never NaN stored as a result.
+"""Load fuzzed configs and damaged results: no traceback, no hang, and no NaN in a stored result.
 
     python scripts/fuzz_campaign.py                          # 2,000 configs, 200 damaged results
     python scripts/fuzz_campaign.py --configs 50 --damaged 20
 
-Half of the configs are built-in ones mutated byte by byte, line by line and value by value, half are drawn key by key
-by hypothesis; each is loaded, and each fourth is also walked, by the rigid model or on its ground. Damaged results are
-cut short, have bits flipped, are overwritten in part, are other files, or are altered and sealed again: other shapes,
-numbers, versions, hostile attributes, ten gigabytes declared. Prints a table in Markdown; exits 1 if anything is wrong.
+Half of the configs are built-in ones, mutated byte by byte, line by line and value by value. The other half are drawn
+key by key by hypothesis. Each is loaded, and some are also simulated, by the rigid or the contact model. Damaged
+results are cut short, have flipped bits, are partly overwritten, are other files, or are altered and sealed again, with
+other shapes, numbers or versions, hostile attributes, or ten gigabytes declared. The script prints a table in Markdown,
+and exits with 1 if anything is wrong.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runs import RunFolder
 
-LONGEST_S = 20.0  # that a config may take to be refused or walked, once its models are compiled
-HANGS_S = 300.0  # after which the campaign ends with a traceback of where it hangs
-WALKED, WALKED_ON_GROUND = 4, 8  # each how-manieth is walked, and with the contact model
+LONGEST_S = 20.0  # maximum time to refuse or simulate a config, once its models are compiled
+HANGS_S = 300.0  # after this time the campaign ends with a traceback of the place where it hangs
+WALKED, WALKED_ON_GROUND = 4, 8  # every 4th config is simulated, every 8th with the contact model
 TOLD_EVERY = 100
 WORDS = (
     b"nan", b".nan", b".inf", b"-1", b"0", b"1e308", b"-1e-308", b"1e-14", b"null", b"[]", b"{}", b"true", b"'", b'"',
@@ -48,31 +49,31 @@ Mutation = Callable[[random.Random, bytearray], None]
 
 
 def change_byte(drawn: random.Random, text: bytearray) -> None:
-    """Another byte somewhere."""
+    """Change a byte."""
     text[drawn.randrange(len(text))] = drawn.randrange(256)
 
 
 def delete_piece(drawn: random.Random, text: bytearray) -> None:
-    """Something is missing."""
+    """Delete a piece."""
     start = drawn.randrange(len(text))
     del text[start : start + drawn.randrange(1, 40)]
 
 
 def repeat_line(drawn: random.Random, text: bytearray) -> None:
-    """A line twice, or elsewhere."""
+    """Repeat or move a line."""
     lines = text.splitlines(keepends=True)
     lines.insert(drawn.randrange(len(lines)), drawn.choice(lines))
     text[:] = b"".join(lines)
 
 
 def insert_word(drawn: random.Random, text: bytearray) -> None:
-    """A troublesome word somewhere."""
+    """Insert a troublesome word."""
     at = drawn.randrange(len(text))
     text[at:at] = drawn.choice(WORDS)
 
 
 def replace_value(drawn: random.Random, text: bytearray) -> None:
-    """Another value of a key."""
+    """Replace the value of a key."""
     lines = text.splitlines()
     at = drawn.randrange(len(lines))
     name, colon, _ = bytes(lines[at]).partition(b":")
@@ -81,7 +82,7 @@ def replace_value(drawn: random.Random, text: bytearray) -> None:
 
 
 def scale_number(drawn: random.Random, text: bytearray) -> None:
-    """A number of quite another size: valid more often than not."""
+    """Change a number to one of another magnitude, which is more often valid than not."""
     lines = text.splitlines()
     numbered = [i for i, line in enumerate(lines) if b": " in line and line.partition(b": ")[2][:1].isdigit()]
     if numbered:
@@ -95,7 +96,7 @@ MUTATIONS: tuple[Mutation, ...] = (change_byte, delete_piece, repeat_line, inser
 
 
 def fuzzed(drawn: random.Random, texts: list[bytes]) -> bytes:
-    """A built-in config, mutated once to four times."""
+    """Mutate a built-in config one to four times."""
     text = bytearray(drawn.choice(texts))
     for _ in range(drawn.randrange(1, 5)):
         if text:
@@ -104,7 +105,7 @@ def fuzzed(drawn: random.Random, texts: list[bytes]) -> bytes:
 
 
 def configs() -> st.SearchStrategy[bytes]:
-    """A few keys over a built-in config: of any value, or of one near to what they are."""
+    """Draw a few keys on top of a built-in config, with any value or one close to the present value."""
     usual = dict(leaves_of(load(None).config.model_dump(mode="json"), ()))
     words = st.sampled_from([word.decode("latin-1") for word in WORDS])
     anything = st.one_of(st.floats(), st.integers(), st.booleans(), st.none(), words, st.text(), st.lists(st.floats()))
@@ -122,7 +123,7 @@ def configs() -> st.SearchStrategy[bytes]:
 
 
 def leaves_of(block: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Path and value of everything in a config."""
+    """Yield path and value of every key of a config."""
     for name, value in block.items():
         if isinstance(value, dict):
             yield from leaves_of(value, (*above, name))
@@ -131,7 +132,7 @@ def leaves_of(block: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[t
 
 
 def text_of(base: str, pairs: list[tuple[tuple[str, ...], Any]]) -> bytes:
-    """A config as YAML that is JSON as well."""
+    """Write a config as YAML that is also JSON."""
     written: dict[str, Any] = {"extends": base}
     for (*blocks, name), value in pairs:
         inner = written
@@ -142,7 +143,7 @@ def text_of(base: str, pairs: list[tuple[tuple[str, ...], Any]]) -> bytes:
 
 
 def drawn_texts(count: int, seed: int) -> list[bytes]:
-    """So many configs that hypothesis draws."""
+    """Return this number of configs drawn by hypothesis."""
     found: list[bytes] = []
 
     @hypothesis.seed(seed)
@@ -156,7 +157,7 @@ def drawn_texts(count: int, seed: int) -> list[bytes]:
 
 
 def loaded(path: Path) -> LoadedConfig | None:
-    """The config of a file, or None if it is refused in words."""
+    """Return the config of a file, or None if it is refused with a message."""
     try:
         return load(path)
     except WalkerlabError as error:
@@ -166,7 +167,7 @@ def loaded(path: Path) -> LoadedConfig | None:
 
 
 def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Load `count` fuzzed configs, walk some; what became of them, and what went wrong."""
+    """Load `count` fuzzed configs and simulate some. Return their fates, and what went wrong."""
     drawn = random.Random(seed)
     builtin = [path.read_bytes() for path in sorted(BUILTIN_FOLDER.glob("*.yaml"))]
     texts = drawn_texts(count // 2, seed)
@@ -180,7 +181,7 @@ def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
             try:
                 fate, took_s = timed(path, runs, number)
-                if took_s > LONGEST_S:  # it may have had a method compiled: once more
+                if took_s > LONGEST_S:  # It may have compiled a method, so try again.
                     fate, took_s = timed(path, runs, number)
                 fates[fate] += 1
                 if took_s > LONGEST_S:
@@ -197,27 +198,29 @@ def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
 
 
 def timed(path: Path, runs: Path, number: int) -> tuple[str, float]:
-    """What becomes of a config, and the processor time (s) that it takes."""
+    """Return the fate of a config, and the processor time (s) that it took."""
     began = time.process_time()
     return fate_of(path, runs, number), time.process_time() - began
 
 
 def fate_of(path: Path, runs: Path, number: int) -> str:
-    """Load a config, and walk some, a few strides at most."""
+    """Load a config, and for some simulate at most a few strides. Return what happened."""
     found = loaded(path)
     if found is None:
-        return "refused with its place"
+        return "refused with its position"
     if number % WALKED:
         return "accepted"
     config = found.config.model_copy(update={"strides": min(found.config.strides, 5)})
     on_ground = config.contact is not None and number % WALKED_ON_GROUND == 0
     stage = "contact-sim" if on_ground else "simulate"
     report = execute(config, stage, RunFolder(runs, found.run_name), Options(force=True))
-    return f"accepted, {stage} walked" if report.no_answer is None else f"accepted, {stage} has no answer, told"
+    return (
+        f"accepted, {stage} walked" if report.no_answer is None else f"accepted, {stage} reports that it has no answer"
+    )
 
 
 def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Damage a stored result `count` times; what was said of it, and what went wrong."""
+    """Damage a stored result `count` times. Return the verdicts, and what went wrong."""
     drawn = random.Random(seed)
     fates: Counter[str] = Counter()
     wrong: list[str] = []
@@ -246,7 +249,7 @@ def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
         path.write_bytes(whole[: len(whole) // 2])
         execute(found.config, "simulate", folder)
         if artifact.read(path).digest() != good.digest():
-            wrong.append("a damaged result is not made anew")
+            wrong.append("a damaged result was not recomputed")
     return fates, wrong
 
 
@@ -258,7 +261,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     began = time.perf_counter()
-    # first, since it has the model compiled, which would count as a hang
+    # This comes first, because it compiles the model, which would otherwise count as a hang.
     damaged, wrong_too = damage_results(asked.damaged, asked.seed)
     configs, wrong = fuzz_configs(asked.configs, asked.seed)
     print("| what | fate | times |\n|---|---|---|")

@@ -1,4 +1,4 @@
-"""Adds to a package what only its build knows: the commit, and the machine code of its kernels (see pyproject.toml)."""
+"""Add to a package what only its build knows: the commit, and the machine code of its kernels (see pyproject.toml)."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ OLDEST_SYSTEMS = ("manylinux_2_17_", "macosx_11_0_")
 
 
 class PackageHook(BuildHookInterface[Any]):
-    """Adds the commit to a wheel's metadata or a source distribution's root, and machine code to a wheel."""
+    """Adds the commit to a wheel's metadata or to the root of a source distribution, and machine code to a wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add both, except to an editable installation, which asks its checkout and compiles when it runs."""
+        """Add both, except to an editable installation, which reads the commit from its checkout and compiles when it
+        runs.
+        """
         if version == "editable":
             return
-        self.folder = tempfile.TemporaryDirectory()  # gone when the build is
+        self.folder = tempfile.TemporaryDirectory()  # deleted after the build
         self.add_commit(build_data)
         if self.target_name == "wheel" and os.environ.get("WALKERLAB_BUILD_KERNELS") != "0":
             self.add_machine_code(build_data)
@@ -39,7 +41,7 @@ class PackageHook(BuildHookInterface[Any]):
             build_data[place][str(path)] = commit.FILE
 
     def add_machine_code(self, build_data: dict[str, Any]) -> None:
-        """Compile all kernels of the built-in walkers; what $WALKERLAB_CACHE has is taken from there."""
+        """Compile all kernels of the built-in walkers, except those that are already in $WALKERLAB_CACHE."""
         code = Path(self.folder.name, "machine_code")
         environment = {"WALKERLAB_CACHE": str(Path(self.folder.name, "cache")), "OMP_NUM_THREADS": "1", **os.environ}
         call = f"from walkerlab.pipeline.run.compile_ahead import build; build({str(code)!r})"
@@ -57,7 +59,7 @@ class PackageHook(BuildHookInterface[Any]):
 
 
 def wheel_tag() -> str:
-    """Tag of a wheel for this Python on the oldest systems that its machine code works on."""
+    """Return the tag of a wheel for this Python on the oldest systems that its machine code supports."""
     from packaging.tags import interpreter_name, interpreter_version, platform_tags
 
     platforms = list(platform_tags())
@@ -66,7 +68,7 @@ def wheel_tag() -> str:
 
 
 def commit_module(root: Path) -> Any:
-    """The package's own module about commits, loaded without the package."""
+    """Load the package's module about commits without the package."""
     spec = importlib.util.spec_from_file_location("commit", root / "walkerlab" / "pipeline" / "store" / "commit.py")
     assert spec is not None
     assert spec.loader is not None

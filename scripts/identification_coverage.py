@@ -1,14 +1,15 @@
-"""Identify walkers from synthetic walks and compare errors with the spread of the estimates.
+"""Identify walkers from synthetic walks, and compare errors with the spread of the estimates.
 
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
        [--disturbed-by floor | kicks | pushes | slope] [--noise normal | correlated | heavy-tailed]
 
 Walks start off the gait, are disturbed on their way, and are measured with noise; `contact` are steps of the contact
-model. The disturbance is a rough floor; random changes of the rates at each heel strike; random pushes at the hip in
-the middle of each swing; or a slope that varies smoothly along the ramp. Correlated noise forgets its past within
-`MEMORY` values; heavy-tailed noise is Student's t with three degrees of freedom. Printed for each walker: the number of
-walks that took all steps and that the model fits, and the share without doubt; the share whose 95 % region holds the
-truth, with its binomial error; and for each parameter the mean standard error over the spread of the estimates.
+model. The disturbance is a rough floor, random changes of the rates at each heel strike, random pushes at the hip in
+the middle of each swing, or a slope that varies smoothly along the ramp. Correlated noise forgets its past within
+`MEMORY` values, and heavy-tailed noise is Student's t with three degrees of freedom. For each walker the script prints
+the number of walks that took all steps and that the model fits, the share without doubt, the share whose 95 % region
+contains the truth, with its binomial error, and for each parameter the mean standard error over the spread of the
+estimates.
 """
 
 import argparse
@@ -50,12 +51,14 @@ STEPS, NOISE, ANGLE_NOISE, PRIOR = 20, (1e-3, 1e-3), 2e-3, 0.01
 
 DISTURBANCE, DISTURBANCES = (0.01, 1e-4), {"simplest": (0.002, 5e-5)}
 """Of the start, in shares of the gait's coordinates, and of the floor, in leg lengths; the simplest walker survives
-less."""
+less.
+"""
 
 
 KICK, RAMP, WAVE, PUSH, MIDDLE = 2e-3, 1e-4, 7.0, 5e-4, 0.4
 """Changes of the rates at heel strikes, as a fraction of the rates; largest change of a varying slope's rise per step,
-in leg lengths; steps of its wave; pushes, as a fraction of m sqrt(g l), and when in a gait's step they come."""
+in leg lengths; steps of its wave; pushes, as a fraction of m sqrt(g l), and when in a gait's step they come.
+"""
 
 
 MEMORY = 10
@@ -80,7 +83,7 @@ def kicked_walk(walks, z, p, kick, draw):
     unit = walks._unit_at(p)
 
     def kicked(start, step):
-        kicks = unit_kicks(unit, start)
+        kicks = unit_kicks(unit.walker, unit.section, start)
         return start + (kick * draw.normal(size=len(kicks)) @ kicks if step else 0.0)
 
     return walk_in_parts(walks, unit, z, lambda start, step: [(0.0, kicked(start, step))])
@@ -100,7 +103,7 @@ def pushed_walk(walks, z, p, push, draw):
 
 
 def walk_in_parts(walks, unit, z, parts_of):
-    """Walk on even ground; `parts_of` returns when each part of a step begins, and its state, from state and number."""
+    """Walk on even ground. `parts_of` maps state and number of a step to the beginnings and the states of its parts."""
     start, periods, lengths, parts = np.array(state_on_section(unit.walker, z)), [], [], []
     for step in range(STEPS):
         own = parts_of(start, step)
@@ -144,7 +147,7 @@ class Truth:
         self.disturbed_by, self.noise = disturbed_by, noise
 
     def walk(self, seed):
-        """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
+        """Measure a walk, or return None if it ends early. Also return a separate measurement of the last parameter."""
         draw = np.random.default_rng(seed)
         heights = draw.normal(0.0, self.roughness * self.leg, STEPS + 1)
         z = self.z * (1.0 + self.start_change * draw.normal(0.0, 1.0, self.z.size))
@@ -165,7 +168,7 @@ class Truth:
         ), weighed
 
     def take_disturbed_walk(self, z, heights, draw):
-        """Return periods, lengths and a function that samples the angles of a walk; None if it ends early."""
+        """Return periods, lengths and a function that samples the angles of a walk, or None if it ends early."""
         p, relative = tuple(self.values), self.roughness / DISTURBANCE[1]
         if self.disturbed_by == "kicks":
             return kicked_walk(self.walks, z, p, KICK * relative, draw)
@@ -190,7 +193,7 @@ class Truth:
 
 
 def region_holds(result, truth):
-    """Whether the 95 % region of the estimates holds the truth."""
+    """Whether the 95 % region of the estimates contains the truth."""
     known = result.information
     error = np.array([estimate.value for estimate in result.estimates]) - truth
     distance = error @ np.linalg.pinv(known.covariance, hermitian=True) @ error
@@ -198,7 +201,9 @@ def region_holds(result, truth):
 
 
 def coverage(truth, seeds):
-    """Return whether regions cover, estimates and standard errors of the walks of these seeds that the model fits."""
+    """Return, for the seeds whose walks the model fits, whether regions contain the truth, estimates, and standard
+    errors.
+    """
     inside, estimates, errors, fits = [], [], [], []
     for seed in seeds:
         walk = truth.walk(seed)

@@ -1,16 +1,16 @@
-"""Kill -9 runs at random moments, and check after each that no broken result is accepted and the next run completes.
+"""Kill runs (kill -9) at random moments. Check that no broken result is accepted and that the next run completes.
 
     python scripts/kill_campaign.py                      # 200 kills of forced rigid-only runs
     python scripts/kill_campaign.py --stage report --config paper --kills 20 --spread
-    python scripts/kill_campaign.py --stage report --config paper --together 2 8   # so many on one folder at once
+    python scripts/kill_campaign.py --stage report --config paper --together 2 8   # 2, then 8 runs at once on a folder
     python scripts/kill_campaign.py --sweeps --kills 50                  # a sweep of fixed points, or a worker of it
 
-Half of the moments fall anywhere in a run, half are when a file of the folder has just begun to change.
-With --spread the moments fall on all results alike: each time another one is missing from a whole folder and being made
-when the run is killed, so that a kill takes no longer than its result.
-With --sweeps either the sweeping process or one below it is killed, within a second of a chunk's being kept; the same
-command then goes on, and at the end two such sweeps run on one folder at once.
-Prints a table in Markdown; exits 1 if anything was lost.
+Half of the moments are at random, and half are when a file of the folder has just begun to change. With --spread the
+moments are spread over all results: each time another result is missing from a complete folder, and the run is killed
+while it computes this result, so that a kill takes no longer than its result. With --sweeps either the sweeping process
+or one of its workers is killed within a second after a chunk was stored. The same command then continues, and at the
+end two such sweeps run on one folder at once. The script prints a table in Markdown, and exits with 1 if anything was
+lost.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ from process_table import processes_below
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 LONGEST_S = 600.0
 LOCK = ".lock"
-LATEST = 0.85  # of the usual time: a run that is over cannot be killed
+LATEST = 0.85  # fraction of the usual time, because a run that has ended cannot be killed
 
 
 def command(stage: str, config: str, runs: Path, *options: str) -> list[str]:
-    """The command line of a run."""
+    """Return the command line of a run."""
     return [sys.executable, "-m", "walkerlab", stage, "-c", config, "--runs", str(runs), "--quiet", *options]
 
 
 def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
-    """A process of its own group, so that its workers die with it."""
+    """Start a process in a group of its own, so that its workers die with it."""
     return subprocess.Popen(
         arguments,
         env=ENVIRONMENT,
@@ -61,7 +61,7 @@ def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
 
 
 def finish(arguments: Sequence[str]) -> tuple[int, str, float]:
-    """Exit code, messages and time (s) of a run that is let be."""
+    """Return exit code, messages and time (s) of a run that is not killed."""
     began = time.perf_counter()
     process = start(arguments)
     _, said = process.communicate(timeout=LONGEST_S)
@@ -69,7 +69,7 @@ def finish(arguments: Sequence[str]) -> tuple[int, str, float]:
 
 
 def state_of(folder: Path) -> dict[str, tuple[int, int]]:
-    """Sizes and times of all files but the lock, to see when one begins to change."""
+    """Return sizes and times of all files but the lock, to notice when one begins to change."""
     found = {}
     for path in folder.rglob("*"):
         if path.name == LOCK:
@@ -83,7 +83,7 @@ def state_of(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def kill_at(process: subprocess.Popen[str], runs: Path, delay_s: float, at_write: bool) -> str:
-    """Kill the process group after a time, or once a file begins to change after it; says when it was."""
+    """Kill the process group after a time, or as soon as a file changes after that. Return when it was."""
     time.sleep(delay_s)
     before = state_of(runs)
     while at_write and process.poll() is None and state_of(runs) == before:
@@ -98,28 +98,28 @@ def kill_at(process: subprocess.Popen[str], runs: Path, delay_s: float, at_write
 
 
 def digests(runs: Path) -> dict[str, str]:
-    """Digest of the content of every stored result, by its place; a broken one raises what `read` raises."""
+    """Return the digest of every stored result by path. A broken result raises the error of `read`."""
     return {str(path.relative_to(runs)): artifact.read(path).digest() for path in sorted(runs.rglob("*.h5"))}
 
 
 def unreadable(runs: Path) -> list[str]:
-    """Results that are there under their own name and are not whole."""
+    """List the results that exist under their own names and are broken."""
     broken = []
     for path in sorted(runs.rglob("*.h5")):
         if path.name.startswith("."):
             continue
         try:
             artifact.read(path)
-        except Exception as error:  # whatever a broken file does to its reader is what is looked for
+        except Exception as error:  # any error of the reader counts
             broken.append(f"{path.name}: {error}")
     return broken
 
 
 class Campaign:
-    """Kills of one kind of run, one after another, and what they did."""
+    """Kills of one kind of run, one after another, and their consequences."""
 
     def __init__(self, stage: str, config: str, seed: int, place: Path) -> None:
-        """Nothing is killed yet; the undisturbed run and the disturbed ones are in folders of `place`."""
+        """Prepare the folders of the undisturbed run and of the disturbed ones in `place`. Nothing is killed yet."""
         self.stage, self.config, self.drawn = stage, config, random.Random(seed)
         self.undisturbed, self.runs = place / "undisturbed", place / "runs"
         self.moments: Counter[str] = Counter()
@@ -127,7 +127,7 @@ class Campaign:
         self.code, self.expected = 0, {}
 
     def undisturbed_run(self, *options: str) -> float:
-        """What each disturbed run is held against; returns its time (s)."""
+        """Compute the reference for the disturbed runs, and return its time (s)."""
         self.code, said, took_s = finish(command(self.stage, self.config, self.undisturbed, *options))
         if self.code not in (0, 4):
             raise SystemExit(f"the undisturbed run exits {self.code}: {said}")
@@ -135,7 +135,7 @@ class Campaign:
         return took_s
 
     def kill(self, most_s: float, about: str, *options: str) -> None:
-        """Kill a run within so many seconds, look what is there, and run again."""
+        """Kill a run within `most_s` seconds, check what is there, and run again."""
         at_write, delay_s = self.drawn.random() < 0.5, self.drawn.uniform(0.0, LATEST * most_s)
         process = start(command(self.stage, self.config, self.runs, *options))
         moment = kill_at(process, self.runs, delay_s, at_write)
@@ -154,7 +154,7 @@ class Campaign:
 
 
 def campaign(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Kill forced runs; returns when the kills were and everything that was lost."""
+    """Kill forced runs. Return the moments of the kills, and everything that was lost."""
     with tempfile.TemporaryDirectory() as place:
         one = Campaign(stage, config, seed, Path(place))
         one.undisturbed_run()
@@ -166,7 +166,7 @@ def campaign(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[st
 
 
 def spread(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Kill runs that make one missing result of a whole folder, each result in turn."""
+    """Kill runs that compute one missing result of a complete folder, each result in turn."""
     with tempfile.TemporaryDirectory() as place:
         one = Campaign(stage, config, seed, Path(place))
         one.undisturbed_run()
@@ -182,13 +182,13 @@ def spread(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str]
 
 
 def making_s(path: Path) -> float:
-    """How long (s) a result took to be made."""
+    """Return the time (s) that a result took."""
     origin = artifact.read(path).provenance
     return (datetime.fromisoformat(origin.ended_utc) - datetime.fromisoformat(origin.started_utc)).total_seconds()
 
 
 def together(stage: str, config: str, counts: Sequence[int]) -> list[str]:
-    """Start several runs on one folder at once, so many and then so many; returns what went wrong."""
+    """Start several runs on one folder at once, for each of the counts. Return what went wrong."""
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as place:
         alone = Path(place) / "alone"
@@ -214,7 +214,7 @@ SWEEP = ("--stage", "fixedpoint", "--over", "slope_deg=0.5:7:400", "--chunk-seco
 
 
 def sweeps(kills: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Kill a sweep at work, parent or worker, and let it go on; returns what was killed and what went wrong."""
+    """Kill a sweep or one of its workers, and let it continue. Return what was killed, and what went wrong."""
     drawn, killed, wrong = random.Random(seed), Counter[str](), list[str]()
     with tempfile.TemporaryDirectory() as place:
         quiet, runs, both = (Path(place) / name for name in ("quiet", "runs", "both"))
@@ -242,7 +242,7 @@ def sweeps(kills: int, seed: int) -> tuple[Counter[str], list[str]]:
                 if what == "parent":
                     break
             process.communicate()
-            if process.returncode == 0:  # done before all kills were: begin anew
+            if process.returncode == 0:  # it ended before all kills, so start over
                 judge(runs, f"after {killed.total()} kills")
                 shutil.rmtree(runs)
         finish(command("sweep", "paper", runs, *SWEEP))
@@ -254,13 +254,13 @@ def sweeps(kills: int, seed: int) -> tuple[Counter[str], list[str]]:
 
 
 def main() -> int:
-    """Run the campaign that was asked for."""
+    """Run the requested campaign."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stage", default="simulate")
     parser.add_argument("--config", default="rigid-only")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--spread", action="store_true", help="kill while each of the results is made in turn")
+    parser.add_argument("--spread", action="store_true", help="kill while each result in turn is being computed")
     parser.add_argument("--together", type=int, nargs="+", metavar="N", help="instead: N runs at once")
     parser.add_argument("--sweeps", action="store_true", help="kill a sweep of fixed points instead")
     asked = parser.parse_args()

@@ -1,11 +1,11 @@
-"""How far a compliant knee stop is from the ideal lock as it grows stiffer, and of what order the difference is.
+"""Measure how a compliant knee stop approaches the ideal lock as it stiffens, and of what order the difference is.
 
     python scripts/knee_stop.py             # the built-in kneed walker
     python scripts/knee_stop.py my.yaml --steps 40
 
-Walks the contact model from the rigid gait, once with the ideal lock and then with stops of ever larger stiffness,
-whose damping grows as its root, so that the damping ratio stays. Compares the last steps' periods and how long into
-them the knee locked. Prints a table in Markdown.
+The contact model walks from the rigid gait, once with the ideal lock and then with ever stiffer stops, whose damping
+grows as the root of the stiffness, so that the damping ratio stays equal. The script compares the periods of the last
+steps and the times at which the knees lock in them, and prints a table in Markdown.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ HEAD = ("stop (N m/rad)", "period (s)", "knee locks after (s)", "period off (s)"
 
 
 def config_of(file: str, *sets: str) -> Config:
-    """The config of a file or of a built-in name."""
+    """Load the config of a file or of a built-in name."""
     return load(Path(file), sets).config
 
 
 def last_step(config: Config, steps: int) -> tuple[float, float]:
-    """Period of the last step (s), and how long after its touch the knee locked (s)."""
+    """Return the period of the last step (s), and the time from its touch to the lock of the knee (s)."""
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     if gait is None:
         raise SystemExit("the rigid model has no gait to start from")
@@ -46,7 +46,7 @@ def last_step(config: Config, steps: int) -> tuple[float, float]:
 
 
 def rows(file: str, steps: int) -> Iterator[list[str]]:
-    """A row of the table for the ideal lock, then one for each stiffness."""
+    """Yield a row of the table for the ideal lock, then one for each stiffness."""
     period, lock = last_step(config_of(file, "walker.knee.lock=ideal"), steps)
     yield ["ideal", f"{period:.6f}", f"{lock:.6f}", "", "", "", ""]
     before: tuple[float, float] | None = None

@@ -1,4 +1,4 @@
-"""What leaving out saves: each reduced scene against the full one, in time, compile time and bytes.
+"""Measure what omissions save: each reduced scene against the full one, in time, compile time and bytes.
 
 Times are processor times. `benchmark.py` prints the table and writes it into docs/performance.md.
 """
@@ -28,13 +28,13 @@ from walkerlab.pipeline.store.provenance import Provenance, begin
 from walkerlab.scene.contact import contact_scene, start_state
 
 ROOT = Path(__file__).resolve().parent.parent
-# nothing but the stage itself runs: the start and the pads ask for no gait
+# Start and pads are given, so that only the stage itself runs.
 GAIT = (-0.2042, 0.1694, -0.6, -0.86)
 GIVEN = (f"start={list(GAIT)}", "contact.pad_pitch=0.3714")
 BUDGET = 10_000_000  # right-hand sides
 IDENTITY = Identity("measured", {}, {}, "")
 NO_FRICTION = ("contact.static_friction=0", "contact.dynamic_friction=0")
-ALIKE = 0.05  # of which two times do not differ
+ALIKE = 0.05  # times that differ by less than this fraction count as equal
 HEAD = ("left out", "against", "right-hand side, ns", "run, ms", "import, s", "compile, s", "file, kB", "conclusion")
 QUANTITIES = ("a right-hand side", "a run", "importing", "compiling", "the file")
 
@@ -43,34 +43,34 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Scene:
-    """What `walkerlab STAGE --set ...` walks."""
+    """A stage and settings, as in `walkerlab STAGE --set ...`."""
 
     stage: str
     sets: tuple[str, ...]
 
     def once(self, artifact: Path) -> None:
-        """Run the stage alone, and store what it makes."""
+        """Run the stage alone, and store its result."""
         content = import_module(PIPELINE[self.stage].module).run(self.config, {}, Silent())
         write(artifact, content, IDENTITY, self.origin)
 
     @cached_property
     def config(self) -> Config:
-        """The paper's, changed."""
+        """Return the paper's config with the changes."""
         return loader.load(None, self.sets).config
 
     @cached_property
     def origin(self) -> Provenance:
-        """What is stored of where the result comes from."""
+        """Return the identity to store with the result."""
         return begin(self.config, {})
 
     def command(self, runs: Path) -> list[str]:
-        """The command line of a run."""
+        """Return the command line of a run."""
         sets = [word for one in self.sets for word in ("--set", one)]
         return [sys.executable, "-m", "walkerlab", self.stage, "--quiet", "--force", "--runs", str(runs), *sets]
 
 
 def with_books(kept: bool) -> None:
-    """A walk of the paper's model, with or without the energy balance: what damping, friction and edges took."""
+    """Simulate the paper's walk, with or without the energy balance: losses to damping, friction and edges."""
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, BUDGET)
@@ -79,14 +79,14 @@ def with_books(kept: bool) -> None:
 
 @dataclass(frozen=True)
 class Reduction:
-    """Something left out: a full scene and a reduced one, their right-hand sides, and what else is to be known.
+    """An omission: a full and a reduced scene, their right-hand sides, and remarks.
 
     sides    names of the full and the reduced right-hand side
     scenes   the full and the reduced scene, run for time and size
-    works    or what the two do instead
-    compile  whether the two are compiled apart
-    imports  what the two have to import, as Python
-    note     said beside the measured conclusion
+    works    calls to time in place of scenes
+    compile  whether to compile the two separately
+    imports  Python code of the imports of both
+    note     remark next to the measured conclusion
     """
 
     what: str
@@ -101,22 +101,22 @@ class Reduction:
 
 
 def contact(*sets: str, strides: int = 5) -> Scene:
-    """A walk of the contact model."""
+    """Build a scene with a walk of the contact model."""
     return Scene("contact-sim", (*GIVEN, f"strides={strides}", *sets))
 
 
 def rigid(*sets: str) -> Scene:
-    """A walk of the rigid model."""
+    """Build a scene with a walk of the rigid model."""
     return Scene("simulate", (GIVEN[0], "strides=5", *sets))
 
 
 def outputs(*names: str) -> str:
-    """Only these outputs."""
+    """Return the setting for these outputs alone."""
     return f"outputs=[{','.join(names)}]"
 
 
 def reductions() -> list[Reduction]:
-    """Every reduction there is, and one that there is not."""
+    """Return all omissions, and one candidate that saves nothing."""
     whole, none = contact(), contact(outputs())
     import_stage = "import walkerlab.{}, walkerlab.pipeline.run.runner"
     walking, drawing = import_stage.format("pipeline.stages.simulate"), import_stage.format("views.figures.stage")
@@ -174,14 +174,14 @@ def reductions() -> list[Reduction]:
 
 
 def leaving_out_rows(sides: dict[str, float], repeats: int) -> list[list[str]]:
-    """The table's rows, given the times of all right-hand sides."""
+    """Return the rows of the table, given the times of all right-hand sides."""
     with tempfile.TemporaryDirectory() as place:
         found = [measured(one, sides, repeats, Path(place)) for one in reductions()]
     return [row_of(one) for one in found]
 
 
 def measured(one: Reduction, sides: dict[str, float], repeats: int, place: Path) -> Reduction:
-    """A reduction with all that is to be known of it."""
+    """Measure one omission."""
     found: dict[str, Pair] = {}
     if one.sides is not None:
         found["a right-hand side"] = (sides[one.sides[0]], sides[one.sides[1]])
@@ -203,7 +203,7 @@ def measured(one: Reduction, sides: dict[str, float], repeats: int, place: Path)
 
 
 def in_turn(repeats: int, full: Callable[[], object], reduced: Callable[[], object]) -> Pair:
-    """Medians of the processor times (s) of two works that take turns, after one of each that is not counted."""
+    """Return medians of the processor times (s) of two calls that take turns, after one uncounted call of each."""
     full(), reduced()
     times: tuple[list[float], list[float]] = ([], [])
     for _ in range(repeats):
@@ -215,7 +215,7 @@ def in_turn(repeats: int, full: Callable[[], object], reduced: Callable[[], obje
 
 
 def processor_s() -> float:
-    """Processor time (s) of this process and of those that it waited for."""
+    """Return the processor time (s) of this process and its finished children."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 
@@ -227,7 +227,7 @@ def run(command: Sequence[str], cache: Path | None = None) -> None:
 
 
 def compile_s(scene: Scene, place: Path) -> float:
-    """Processor time (s) of a first run less that of a second one."""
+    """Return the processor time (s) of a first run minus that of a second one."""
     with tempfile.TemporaryDirectory(dir=place) as cache:
         work = partial(run, scene.command(place), Path(cache))
         start = processor_s()
@@ -239,7 +239,7 @@ def compile_s(scene: Scene, place: Path) -> float:
 
 
 def row_of(one: Reduction) -> list[str]:
-    """A row: each quantity as full -> reduced."""
+    """Format a row, with each quantity as full → reduced."""
     pairs = [one.found.get(name) for name in QUANTITIES]
     cells = ["" if pair is None else f"{digits(pair[0])} → {digits(pair[1])}" for pair in pairs]
     note = f"; {one.note}" if one.note else ""
@@ -247,12 +247,12 @@ def row_of(one: Reduction) -> list[str]:
 
 
 def digits(value: float) -> str:
-    """Three digits, or all before the point."""
+    """Format a number with three digits, or all digits before the point."""
     return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def conclusion(found: dict[str, Pair]) -> str:
-    """What is saved, what is not, and what is even slower."""
+    """State what is saved, what is not, and what is slower."""
     saved = {name: 1.0 - reduced / full for name, (full, reduced) in found.items()}
     gains = [f"{100 * share:.0f} % of {name}" for name, share in saved.items() if share > ALIKE]
     losses = [f"{-100 * share:.0f} % to {name}" for name, share in saved.items() if share < -ALIKE]

@@ -31,7 +31,10 @@ from walkerlab.physics.orbits.fixed_point import SearchSettings, find_gaits
 
 ALLOWED = 1e-10  # difference of a stride, in leg lengths and pendulum times
 ALLOWED_MULTIPLIER = 1e-5
-STEPS = (2e-5, 3e-6)  # of the central differences, in rad and rad per pendulum time; the second where the first differs
+STEPS = (
+    2e-5,
+    3e-6,
+)  # steps of central differences, rad and rad per pendulum time; the second is tried if the first differs
 STARTS = SearchSettings(20, 100)
 PUSHES = (0.002, 0.006)  # N s per kg, range of push-offs
 
@@ -48,7 +51,7 @@ def draw(number: int, seed: int) -> tuple[str, Walker]:
 
 
 def on_slope(plain: Walker, stance: float) -> float:
-    """The angle of leg 1 behind leg 2, with both feet on the slope."""
+    """Return the angle of leg 1 behind leg 2 with both feet on the slope."""
     swing = plain.swing(0)
     height = lambda angle: swing.foot_height(0.0, np.array([angle, stance + plain.slope, 0.0, 0.0]))  # noqa: E731
     upright = -plain.legs[0].centre_ahead / plain.legs[0].length
@@ -56,7 +59,7 @@ def on_slope(plain: Walker, stance: float) -> float:
 
 
 def differences(plain: Walker, state: NDArray[np.float64], tau: float, step: float) -> NDArray[np.complex128]:
-    """The multipliers of a stride by central differences of a size over stance angle and both rates."""
+    """Return the multipliers of a stride by central differences over stance angle and both rates."""
     columns = []
     for k, scale in ((1, 1.0), (2, 1.0 / tau), (3, 1.0 / tau)):
         ends = []
@@ -70,7 +73,7 @@ def differences(plain: Walker, state: NDArray[np.float64], tau: float, step: flo
 
 
 def apart(plain: Walker) -> tuple[float, float] | None:
-    """Largest difference of a stride, and of a multiplier, or None where no gait is found."""
+    """Return the largest differences of a stride and of a multiplier, or None if no gait is found."""
     walker = model_of(plain)
     gait = find_gaits(walker, settings=STARTS).gait
     if gait is None:

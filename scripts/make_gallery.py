@@ -1,4 +1,4 @@
-"""The gallery of the documentation: a report of each built-in walker, and a sweep whose gaits walk.
+"""Write the gallery of the documentation: a report of each built-in walker, and a sweep whose gaits are animated.
 
     python scripts/make_gallery.py SITE/gallery [--runs RUNS] [--only sweep]
 
@@ -65,7 +65,7 @@ def walker(name: str, track: Track, strikes: Sequence[float]) -> Walker:
 
 
 def sweep_page(runs: Path) -> str:
-    """The page over the sweep of slope and hip mass."""
+    """Write the page of the sweep over slope and hip mass."""
     swept = walkerlab.sweep("fixedpoint", {"slope_deg": SLOPES, "walker.hip_mass_kg": HIPS}, runs=runs)
     slopes, hips = ([float(value) for value in swept[name]] for name in ("slope_deg", "hip_mass_kg"))
     gaits = [
@@ -108,7 +108,7 @@ def sweep_page(runs: Path) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the pages."""
+    """Write all pages."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="where the pages go")
     parser.add_argument("--runs", type=Path, default=Path("runs"))

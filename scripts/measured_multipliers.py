@@ -1,11 +1,12 @@
-"""How noise biases multipliers that are measured by least squares over many trials.
+"""Measure how noise biases multipliers that are estimated by least squares over many trials.
 
 Usage: python scripts/measured_multipliers.py [CONFIG, round-feet by default] [TRIALS, 63 by default]
 
 Each trial starts off the gait by 0.03 rad (standard deviation), and by as much in the rates of the unit walker. The
-state at a heel strike and at the next one is measured with noise. Least squares on all pairs gives the map from one to
-the next; noise in the first state biases it. Errors-in-variables subtracts the known covariance of that noise first.
-Printed for each noise: the moduli of the multipliers, as median and spread over repeated experiments.
+states at a heel strike and at the next one are measured with noise. Least squares on all pairs gives the map from one
+to the next. Noise in the first state biases the map; the errors-in-variables estimate first subtracts the known
+covariance of that noise. For each noise the script prints the moduli of the multipliers, as median and spread over
+repeated experiments.
 """
 
 import sys

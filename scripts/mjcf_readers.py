@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Make the table of docs/engines.md: what programs read of an exported model, and how it walks in them.
+"""Make the table of docs/engines.md: how programs read an exported model, and how it walks in them.
 
 Usage: python scripts/mjcf_readers.py MODEL.xml [STEP_S]
 
-Tries every reader that is installed here. The walk starts from the keyframe and has ten steps. Each reader gets
-the lines that the documentation says to type. STEP_S is the time step in Drake and Newton.
+The script tries every reader that is installed, with the lines that the documentation tells users to type. The walk
+starts from the keyframe and has ten steps. STEP_S is the time step in Drake and Newton.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ STEPS, UNTIL_S = 10, 9.0
 
 
 class Feet:
-    """Touches of a walk, from the coordinates alone: a ball that is on the ground ahead of the other one."""
+    """Touches of a walk, found from the coordinates alone: a ball comes down on the ground ahead of the other one."""
 
     def __init__(self, path):
         self.model = mujoco.MjModel.from_xml_path(path)
@@ -36,7 +36,7 @@ class Feet:
         self.stance, self.touches = 1, []
 
     def follow(self, time_s, q):
-        """Note a touch; returns whether the walk goes on."""
+        """Note a touch, and return whether the walk goes on."""
         self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         feet = self.data.geom_xpos[self.feet]

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measure means of MuJoCo that exported models use or could use: make the table of docs/engines.md.
+"""Compare features of MuJoCo that exported models use or could use: make the table of docs/engines.md.
 
 Usage: python scripts/mujoco_means.py [CONFIG ...], by default paper, level and kneed-round-feet
 
-Each walker takes up to ten steps. Printed: the largest difference of a step's period and length from those of our
-contact model, the depth of the stance foot at rest over that of our law (with the legs apart, and side by side), and
-the processor time of a time step.
+Each walker takes up to ten steps. The script prints the largest difference of a step's period and length from those of
+our contact model, the depth of the stance foot at rest over that of our law (with the legs apart, and side by side),
+and the processor time of a time step.
 """
 
 import re
@@ -29,7 +29,7 @@ BELT_M_S = -0.5
 
 
 def without_pairs(text):
-    """Leave the contacts to the feet, whose damper also acts in friction."""
+    """Define the contacts by the feet alone, whose damper then also acts in friction."""
     return re.sub(r"<contact>.*?</contact>", "", text, flags=re.DOTALL)
 
 
@@ -42,7 +42,7 @@ def with_flag(text):
 
 
 def on_treadmill(text):
-    """Let the ground move backwards, and the walker with it at the start."""
+    """Let the ground move backwards, and at the start the walker with it."""
     text = re.sub(r'(<geom name="pad_[^>]*?) ?/>', rf'\1 surfacevel="{BELT_M_S} 0 0 0 0 0"/>', text)
     return re.sub(r'qvel="(\S+)', lambda match: f'qvel="{float(match[1]) + BELT_M_S!r}', text)
 
@@ -58,7 +58,7 @@ MEANS = {
 
 
 def exported(name, *settings):
-    """Text of the model, our walk, the law's depth at rest, and whether the ground consists of pads."""
+    """Return the text of the model, our walk, the depth of the law at rest, and whether the ground consists of pads."""
     config = load(Path(name), settings).config
     gait = run_in_memory("fixedpoint", config).summary
     start = GaitStart(gait["step_length_m"], gait["state"], gait["asymmetry"]["step_length"])
@@ -68,7 +68,9 @@ def exported(name, *settings):
 
 
 def take_steps(walk, steps):
-    """Largest relative differences of periods and lengths from ours, and the processor time (s) of a time step."""
+    """Return the largest relative differences of periods and lengths from ours, and the processor time (s) of a time
+    step.
+    """
     belt = BELT_M_S if walk.model.flg_surfacevel else 0.0
     count = 0
     begun = time.process_time()
@@ -84,7 +86,7 @@ def take_steps(walk, steps):
 
 
 def depth_at_rest(model, depth, relative):
-    """Depth of the stance foot under the weight over `depth`, if joints hold what the ground does not.
+    """Return the depth of the stance foot under the weight, over `depth`. Joints hold what the ground does not.
 
     relative  factor on the angle between the legs in the pose of the gait
     """
@@ -126,7 +128,7 @@ def main(names):
             changed = change(text)
             mujoco.set_mjcb_control(None)
             model = mujoco.MjModel.from_xml_string(changed)
-            # the force of a belt on the foot depends on the damper in friction, too
+            # The force of a belt on the foot also depends on the damper in friction.
             still = not model.flg_surfacevel
             rests = [depth_at_rest(model, depth, relative) for relative in (1.0, 0.0) if still]
             taken, differences, took = take_steps(Walk(mujoco.MjModel.from_xml_string(changed)), steps)

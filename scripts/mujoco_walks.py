@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Compare ten steps of exported walkers in MuJoCo with our contact model.
 
-The results are in docs/exchange-details.md and docs/legs.md.
+The results are in docs/exchange-details.md and docs/legs-reference.md.
 
 Usage: python scripts/mujoco_walks.py [CONFIG [KEY=VALUE ...]], by default the walkers of both tables
 
-Printed for each walker: periods and lengths of the last two steps here and in MuJoCo, and the largest difference of any
-step.
+For each walker the script prints periods and lengths of the last two steps here and in MuJoCo, and the largest
+difference in any step.
 """
 
 import sys
@@ -18,6 +18,7 @@ from mujoco_means import exported, take_steps
 from walkerlab.exchange.mujoco_script import Walk
 
 PADS = "contact.terrain=checkerboard"
+FIRM = "stiffness: 300000, damping: 270, stiction_velocity: 10, friction_velocity: 100"
 WALKERS = (
     ("kneed",),
     ("kneed-round-feet",),
@@ -27,6 +28,7 @@ WALKERS = (
     ("prosthesis", PADS),
     ("round-feet", PADS, "walker.leg_2={leg_length_m: 0.4005}"),
     ("kneed-round-feet", "walker.leg_2={shank: {mass_kg: 0.052}, foot_radius_m: 0.21}"),
+    ("one-knee", f"contact={{{FIRM}, terrain: checkerboard}}"),
 )
 
 

@@ -1,12 +1,13 @@
-"""Is the numerical error that an answer carries of the size of its true error, and what does it cost?
+"""Compare the numerical error that an answer states with its true error, and measure the cost.
 
     python scripts/numerical_error.py                 # 60 walks of the contact campaign, seeds 0 to 59
     python scripts/numerical_error.py --walks 6 --seed 3 --steps 10
 
-Walks are drawn as in scripts/contact_campaign.py, on compliant ground, and walked at the config's tolerances, a hundred
-times tighter, which gives the numerical error, and ten thousand times tighter, which gives the true error. Prints a
-table in Markdown: for each walk both errors of a step's period, of its length and of the end, and the work of the
-second walk over that of the first; below it how often the numerical error is within a factor of the true one.
+Walks on compliant ground are drawn as in scripts/contact_campaign.py. Each is computed at the config's tolerances, at a
+hundred times tighter ones, which give the numerical error, and at ten thousand times tighter ones, which give the true
+error. The script prints a table in Markdown: for each walk both errors of the step period, of the step length and of
+the end time, and the work of the second walk over that of the first. Below it stands how often the numerical error is
+within a factor of the true one.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from walkerlab.pipeline.stages.numerical_error import change
 
 ERRORS = (*ERROR_OF_EACH_STEP.values(), "end_time_s")
 FACTORS = (1.5, 10.0)
-LEAST = 1e-11  # s or m: below it both are rounding, or the last digits of an event's time
+LEAST = 1e-11  # s or m; smaller errors are rounding, or the last digits of the time of an event
 
 
 def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
-    """Summaries of the walk from the default to the tightest tolerance, and their right-hand sides."""
+    """Return summaries of the walk from the default to the tightest tolerance, and their counts of right-hand sides."""
     config, scene = scene_of(drawn)
     walks = [ours_at(scene, config, drawn, steps, tighter) for tighter in TIGHTER]
     return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]
 
 
 def told(error: dict[str, Any], key: str) -> str:
-    """An error in a table."""
+    """Format an error for the table."""
     return f"{error[key]:.1e}" if key in error else "-"
 
 
 def main() -> None:
-    """Walk them all."""
+    """Compute all walks, and print the table."""
     chosen = arguments(__doc__, walks=60, steps=6)
     ratios: dict[str, list[float]] = {key: [] for key in ERRORS}
     numerical: list[float] = []

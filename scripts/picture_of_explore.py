@@ -1,4 +1,4 @@
-"""The picture of docs/explore.md: `walkerlab explore` in a headless Chromium, at 2.5 degrees.
+"""Take the picture of docs/explore.md: `walkerlab explore` in a headless Chromium, at 2.5 degrees.
 
 python scripts/picture_of_explore.py
 """
@@ -20,7 +20,7 @@ PICTURE = ROOT / "docs" / "images" / "explore.png"
 
 
 class Address:
-    """A page that is no file."""
+    """Address of a page that is not a file."""
 
     def __init__(self, text):
         self.text = text

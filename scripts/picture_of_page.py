@@ -1,4 +1,4 @@
-"""The picture of the report in docs/tutorial.md: the page of the tutorial's walker in a headless Chromium.
+"""Take the picture of the report in docs/tutorial.md: the page of the tutorial's walker in a headless Chromium.
 
 python scripts/picture_of_page.py
 """

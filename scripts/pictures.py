@@ -31,7 +31,7 @@ from walkerlab.views.figures import robustness
 from walkerlab.views.figures import sweep as sweep_figures
 from walkerlab.views.figures.canvas import Drawing, as_file
 from walkerlab.views.figures.registry import FIGURES
-from walkerlab.views.figures.stick_diagram import film_times, pictures, sticks_of
+from walkerlab.views.figures.stick_diagram import film_times, pictures, read_sticks
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -106,7 +106,7 @@ class Film:
 
     def frames(self, runs: Path) -> Iterator[Any]:
         contact, rigid = (
-            sticks_of(cast(Stored, api.run(stage, self.config, None, runs).content))
+            read_sticks(cast(Stored, api.run(stage, self.config, None, runs).content))
             for stage in ("contact-sim", "simulate")
         )
         terrain = api.run("contact-sim", self.config, None, runs).content.groups.get("terrain")

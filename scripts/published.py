@@ -13,12 +13,12 @@ from pathlib import Path
 from walkerlab.config.check import Check
 from walkerlab.config.loader import load
 from walkerlab.evidence.check.answer import Checked, check_gait
-from walkerlab.evidence.check.causes import generate_families, generate_mistakes
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
-from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
+from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker, list_mistakes
 from walkerlab.evidence.check.section import COLUMNS, headline, is_short, remarks, source_of
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.views.report.numbers import number
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -40,47 +40,56 @@ at most the first four are right:
 
 {story}
 
-The cause is one term. In the heel strike of the script, the balance of the trailing leg about the hip subtracts a
-term that should not be there: the leg's moment of inertia about its centre of mass, I, times the rate at which the
-angle between the legs changes. With this mistake all digits follow. A later script of the same hand has the right
-strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself, or any other
-name from the table below:
+The cause is one term. In its heel strike, the script computes the angular momentum of the trailing leg about the hip,
+and adds a term that should not be there:
+
+```
+-I * (rate of the trailing leg - rate of the leading leg)
+```
+
+Here I is the leg's moment of inertia about its centre of mass. With this mistake all digits follow. A later script by
+the same author has the right heel strike ([passivewalker-sim](published-right.md#passivewalker-sim)). To see it for
+yourself, type this, or `published/NAME.yaml` with another name from the tables:
 
 ```
 walkerlab check published/passivewalker-2009.yaml
 ```
 
-Two more stories: a much-quoted state of a walker with knees is not periodic, and the cause is unknown
-([hsu-chen-2007](#hsu-chen-2007)). And the paper that this project reproduces has a wrong sign in its equations,
-which its own fixed point shows ([adams-compass](#adams-compass)).
+There are two more stories. A much-quoted state of a walker with knees is not periodic, and we do not know why
+([hsu-chen-2007](#hsu-chen-2007)). And the paper that this project reproduces has a wrong sign in its equations, as its
+own printed state shows ([adams-compass](#adams-compass)).
 
-Next come the gaits that differ, one by one. Those that are right have [a page of their own](published-right.md),
-and [known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [whose third
-digit is right](check.md).
+Below are the gaits that differ, one by one. Those that are right have [a page of their own](published-right.md), and
+[known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [check a gait](check.md).
 
 ## Gaits that differ
 
 {overview}
 
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
-one that shares no equations with it. For each value there is a verdict:
+one that shares no equations with it. For all {all} gaits they agree: after a step of the plain model from the gait of
+the compiled one, the state and the period differ by {routes} at most (angles in rad, rates and the period scaled with
+sqrt(L/g)). Each printed value gets a verdict:
 
-- *Reproduced*: the printed and the right value are equal after both are rounded, or cut off, to all printed digits,
-  or to at least three that are at least half of them. If not all digits agree, the table shows how many do, and how
-  far off the printed value is, in units of its last digit. Otherwise the value is *different*.
-- If values differ, the program looks for one cause that gives all of them: a convention, a mistake that is known
-  from programs, or a misprint. The gait is *explained* if there is one, and *partly explained* if a cause gives
-  some of the values to their last digit.
+- *Reproduced*: it agrees with the right one in all printed digits, after rounding or cutting off.
+- *Reproduced to n digits*: it agrees in n digits, at least three and at least half of those printed. The table says how
+  far off it is, in units of its last digit.
+- *Different*: anything else.
 
-The signs and angles of each source are kept, and the right values are written in its convention. *One exact step* is a
-step of the right equations from the printed state, without a noticeable numerical error. If the state is periodic,
-the step leads back to it.
+If values differ, the program looks for one cause: another convention, a mistake known from programs, or a misprint.
+
+- *Explained*: the cause gives all printed values, to the last digit.
+- *Partly explained*: it gives some of them.
+
+The signs and angles of each source are kept, and the right values are converted to them. *One exact step* is a step of
+the right equations from the printed state, without a noticeable numerical error. If the state is periodic, the step
+leads back to it.
 """
 TAIL = """## The longest case
 
-The study that this project reproduces prints 38 values; [the study](study.md) judges each with its evidence. Its
-words *reproduced* and *explained* mean what they mean here. *Contradicted* is a different value that other values
-of the paper refute, and *not reproduced* is a value that is different and unexplained, or that cannot be compared.
+The study that this project reproduces prints 38 values, and [the study](study.md) judges each of them. *Reproduced* and
+*explained* have the same meaning there. Two more verdicts are *contradicted*, for a value that other values of the
+paper refute, and *not reproduced*, for a value that differs without an explanation or cannot be compared.
 """
 RIGHT = """# Published gaits that are right
 
@@ -97,7 +106,7 @@ that differ, and says what *reproduced* means.
 MISTAKES = """# Known mistakes in programs for walkers
 
 Your gait is close to the right one, but not equal to it. Each row below is a mistake that `walkerlab check` tries on
-your values ([whose third digit is right](check.md)), and how much it changes a gait.
+your values ([check a gait](check.md)), and how much it changes a gait.
 
 {made}
 
@@ -128,18 +137,19 @@ def comment_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """A printed gait: its name, source, finding, count of reproduced values, table and paragraphs."""
+    """A printed gait: name, source, finding, count of reproduced values, difference of both routes, and texts."""
 
     name: str
     source: str
     finding: str
     reproduced: str
+    routes: float
     table: str
     paragraphs: tuple[str, ...]
 
 
 def entry_of(file: Path) -> Entry:
-    """Check a printed gait, and return what the pages say of it."""
+    """Check a printed gait, and return its entry on the pages."""
     summary = check_gait(load(file).config)
     source = summary["source"]
     rows = summary["values"]
@@ -155,6 +165,7 @@ def entry_of(file: Path) -> Entry:
         source=", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"],
         finding=finding_of(summary),
         reproduced=f"{len(reproduced)} of {len(rows)}{note}",
+        routes=difference_of_routes(summary),
         table=table,
         paragraphs=(
             comment_of(file),
@@ -166,13 +177,21 @@ def entry_of(file: Path) -> Entry:
     )
 
 
+def difference_of_routes(summary: Mapping) -> float:
+    """Return the difference of both models. Exits with a message if they do not agree."""
+    routes = summary["routes"]
+    if routes is None or not routes["agree"]:
+        sys.exit(f"the two routes do not agree on {summary['source']['title']}: {routes}")
+    return routes["difference"]
+
+
 def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a Markdown table."""
     return "\n".join(f"| {' | '.join(cells)} |" for cells in [heads, ["---"] * len(heads), *rows])
 
 
 def finding_of(summary: Mapping) -> str:
-    """Return what was found; partly explained if a cause gives some of the values that differ."""
+    """Return the finding. It is 'partly explained' if a cause gives some of the values that differ."""
     unexplained = summary["finding"] not in ("explained", "reproduced")
     return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
 
@@ -184,6 +203,7 @@ def pages() -> dict[str, str]:
     right = [entry for entry in entries if entry.finding == REPRODUCED]
     wrong = [entry for entry in entries if entry.finding != REPRODUCED]
     counts = {"all": len(entries), "right": len(right), "wrong": len(wrong), "made": MADE}
+    counts["routes"] = number(max(entry.routes for entry in entries), 1)
     story = next(entry.table for entry in entries if entry.name == STORY)
     compass, round_feet = mistakes()
     texts = {
@@ -215,8 +235,7 @@ def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, Plain
     """Return the right gait of a config's walker, and its walkers with mistakes."""
     config = load(Path(name)).config
     right = Checked(config, Check(), find_gaits(rigid_walker(config))).right
-    known = [(each.what, each.walker) for each in generate_mistakes(right.walker)]
-    known += [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in generate_families(right.walker)]
+    known = [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in list_mistakes(right.walker)]
     return right, known
 
 
@@ -235,8 +254,8 @@ def mistakes() -> list[str]:
             if gait is None:
                 rows.append((0.0, [what, "no gait near", "", ""]))
                 continue
-            pairs = [(gait[0][k], right.start[k]) for k in (STANCE, 2 + STANCE)]
-            pairs.append((gait[1].period, right.step.period))
+            pairs = [(gait.start[k], right.start[k]) for k in (STANCE, 2 + STANCE)]
+            pairs.append((gait.step.period, right.step.period))
             changes = [100.0 * (wrong / true - 1.0) for wrong, true in pairs]
             rows.append((abs(changes[-1]), [what, *(f"{change:+.2g} %" for change in changes)]))
         rows.sort(key=lambda row: -row[0])

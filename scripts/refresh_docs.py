@@ -58,10 +58,10 @@ PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?
 
 
 class Results:
-    """Summaries of stages, run in a folder when they are asked for."""
+    """Summaries of stages, computed in a folder on first use."""
 
     def __init__(self, runs: Path) -> None:
-        """Run in, and reuse what is in, the folder of runs."""
+        """Use this folder of runs, and reuse its results."""
         self.runs = runs
         self.summary = cache(self._summary)
 
@@ -71,18 +71,18 @@ class Results:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
+    """Format a Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
 def number(value: float, digits: int) -> str:
-    """A number with so many decimals, with a true minus sign."""
+    """Format a number with a fixed number of decimals and a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
 
 
 def stages(_results: Results) -> str:
-    """What the stages are, what they need under the paper config, and what they read."""
+    """Tabulate the stages, with the stages that they need under the paper config and the keys that they read."""
     config = load(None, ()).config
     rows = [
         [f"`{stage.name}`", stage.purpose, ", ".join(stage.inputs(config)) or "nothing", ", ".join(stage.reads(config))]
@@ -92,7 +92,7 @@ def stages(_results: Results) -> str:
 
 
 def config_keys(_results: Results) -> str:
-    """Every key of a config; a key that means the same for each type of walker stands there once."""
+    """Tabulate every config key. A key that means the same for each type of walker is listed once."""
     rows: dict[tuple[str, ...], None] = {}
     for reference in keys():
         key, *rest = astuple(reference)
@@ -108,7 +108,7 @@ def config_keys(_results: Results) -> str:
 
 
 def gaits(results: Results) -> str:
-    """The gaits of the paper's walker: both sets of equations, and the slope of Goswami et al."""
+    """Tabulate the gaits of the paper's walker: both sets of equations, and the slope of Goswami et al."""
     paper = results.summary("fixedpoint")["equation_sets"]
     rows = [
         gait_row("0.0174 rad, corrected", paper["corrected"]),
@@ -127,7 +127,7 @@ def gaits(results: Results) -> str:
 
 
 def gait_row(name: str, gait: dict[str, Any]) -> list[str]:
-    """A gait in a row of a table."""
+    """Format a gait as a row of a table."""
     state = [number(value, 6) for value in gait["state"]]
     return [
         name,
@@ -140,7 +140,7 @@ def gait_row(name: str, gait: dict[str, Any]) -> list[str]:
 
 
 def multipliers(pairs: Sequence[Sequence[float]]) -> str:
-    """Multipliers, complex pairs as one entry."""
+    """Format multipliers, complex pairs as one entry."""
     real = [number(re_, 4) for re_, im in pairs if im == 0.0]
     double = [f"{number(re_, 4)} ± {number(im, 4)} i" for re_, im in pairs if im > 0.0]
     return ", ".join([*double, *real])
@@ -152,7 +152,7 @@ PRINTED_DIGITS = {"theta_1": 4, "theta_2": 4, "dtheta_1": 2, "dtheta_2": 2}
 
 
 def paper_and_ours(results: Results) -> str:
-    """What the paper prints beside what the tool computes: starts, steps, energy, stability, slip."""
+    """Tabulate printed and computed values: starts, steps, energy, stability, slip."""
     compared, walk = results.summary("compare"), results.summary("contact-sim")
     starts, ends = compared["table2"], compared["table3"]
     single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
@@ -173,7 +173,7 @@ def paper_and_ours(results: Results) -> str:
 
 
 def study_in_five_rows(results: Results) -> str:
-    """Start, step period, step length, stability and energy of the paper and of both models."""
+    """Tabulate start, step period, step length, stability and energy of the paper and of both models."""
     compared = results.summary("compare")
     single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
     cells = [
@@ -184,24 +184,24 @@ def study_in_five_rows(results: Results) -> str:
         beside("mean energy (J)", compared["table3"]["E_avg"], 2),
     ]
     rows = [[title, paper, printed, corrected, contact] for title, paper, printed, corrected, _, contact in cells]
-    head = ["", "paper (MATLAB)", "rigid model, equations as printed", "sign corrected", "contact model"]
+    head = ["", "paper (MATLAB)", "rigid model, printed equations", "rigid model, sign corrected", "contact model"]
     return re.sub(r" *\| *", "|", table(head, rows))
 
 
 def printed_once(title: str, entry: dict[str, Any]) -> list[str]:
-    """A row of a number that the paper prints for both of its models in one."""
+    """Format the row of a value that the paper prints once for both of its models."""
     ours = {name: "" if entry[name] is None else number(entry[name], 4) for name in OURS}
     return [title, entry["printed"], ours["as_printed"], ours["corrected"], entry["printed"], ours["contact"]]
 
 
 def beside(title: str, row: dict[str, Any], printed_digits: int) -> list[str]:
-    """A row of the paper's tables: its own columns with the digits it prints, ours with four."""
+    """Format a row of the paper's tables: its columns with the printed digits, ours with four digits."""
     cells = [number(row[name], printed_digits if name.startswith("paper") else 4) for name in COLUMNS]
     return [title, *cells]
 
 
 def errata(results: Results) -> str:
-    """The paper's errata."""
+    """Tabulate the paper's errata."""
     rows = [
         [cell(entry[name]) for name in ("where", "printed", "right", "evidence")]
         for entry in results.summary("compare")["errata"]
@@ -210,7 +210,7 @@ def errata(results: Results) -> str:
 
 
 def cell(text: str) -> str:
-    """A text that may stand in a table's cell."""
+    """Escape a text for a cell of a table."""
     return text.replace("|", "\\|").replace("*", "\\*")
 
 
@@ -225,12 +225,15 @@ PARTS: dict[str, Callable[[Results], str]] = {
 
 
 def refreshed(text: str, results: Results) -> str:
-    """A document with its parts made anew; KeyError for a part that there is no maker of."""
+    """Return a document with its generated parts made anew.
+
+    Raises KeyError for a part that has no generator.
+    """
     return PART.sub(lambda found: found[1] + PARTS[found[2]](results) + found[4], text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Refresh or check all documents; the exit code."""
+    """Refresh or check all documents, and return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("documents", nargs="*", type=Path, help="whose examples to try; default: all")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is out of date")
@@ -266,7 +269,7 @@ def write_downloads() -> None:
 
 
 def refresh(path: Path, results: Results, write: bool) -> bool:
-    """Whether a document was current; it is afterwards if `write`."""
+    """Return whether a document was current. With `write`, bring it up to date."""
     old = path.read_text(encoding="utf-8")
     new = refreshed(old, results)
     if write and new != old:
@@ -275,13 +278,13 @@ def refresh(path: Path, results: Results, write: bool) -> bool:
 
 
 def with_examples() -> list[Path]:
-    """The documents that have examples."""
+    """Return the documents that have examples."""
     documents = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
     return [path for path in documents if EXAMPLE.search(path.read_text(encoding="utf-8"))]
 
 
 def try_examples(documents: Sequence[Path], slow: bool) -> int:
-    """Print what examples print otherwise than documents say; 1 if one does."""
+    """Print how the output of examples differs from the documents. Return 1 if any differs."""
     found = []
     for path in documents:
         with tempfile.TemporaryDirectory() as folder:
@@ -291,7 +294,7 @@ def try_examples(documents: Sequence[Path], slow: bool) -> int:
 
 
 def differences(path: Path, folder: Path, slow: bool = False, run: Run | None = None) -> Iterator[str]:
-    """For each example of a document that prints something else than is shown: the command, and both texts."""
+    """Yield, for each example of a document whose output differs, the command, the text shown and the output."""
     run = run or run_in_shell
     names: dict[str, Any] = {}
     exit_code = 0
@@ -317,7 +320,7 @@ def differences(path: Path, folder: Path, slow: bool = False, run: Run | None = 
 
 
 def run_in_shell(command: str, exit_code_before: int) -> tuple[str, int]:
-    """What a command prints, after one that ended with an exit code: its answer, or its errors too if it fails."""
+    """Run a command after one with this exit code. Return its answer (with errors if it fails), and its exit code."""
     environment = os.environ | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
         **TERMINAL,
@@ -329,7 +332,7 @@ def run_in_shell(command: str, exit_code_before: int) -> tuple[str, int]:
 
 
 def answer_of(done: subprocess.CompletedProcess[str]) -> str:
-    """What a command printed: its answer, or its errors too if it failed."""
+    """Return the output of a command, with its errors if it failed."""
     return (done.stdout + (done.stderr if done.returncode else "")).replace("\u00a0", " ")
 
 

@@ -1,4 +1,4 @@
-"""The right-hand sides of all scenes, and what one of them takes."""
+"""The right-hand sides of all scenes, and the time of one evaluation."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ for formula in (swing_constants, accelerations):
 
 
 class AppendixA(NamedTuple):
-    """The compass's equations typed by hand, for one walker only."""
+    """The equations of the compass, written out for one walker only."""
 
     walker: RigidWalker
 
 
 @derivative.case(AppendixA)
 def appendix_a_derivative(system: AppendixA, t: float, y: Any, f: Any) -> None:
-    """(A.58)."""
+    """Evaluate (A.58)."""
     f[0], f[1] = y[2], y[3]
     f[2], f[3] = accelerations(system.walker, y[0], y[1], y[2], y[3])
 
 
 @kernel
 def call_often(system: Any, states: Any, rates: Any, calls: int) -> None:
-    """Right-hand sides at states (STATES, n) in turn, every component of each stored into `rates`."""
+    """Evaluate right-hand sides at states (STATES, n) in turn, and store every component of each in `rates`."""
     for call in range(calls):
         place = call % states.shape[0]
         derivative(system, 0.0, states[place], rates[place])
 
 
 def systems() -> dict[str, tuple[Any, State]]:
-    """Every right-hand side that is timed, and the state around which it is."""
+    """Return every right-hand side to time, with a typical state."""
     rigid = rigid_walker(ONE_DEGREE, "corrected")
     heavy = rigid_walker(loader.load(None, ("slope_deg=1", "walker.leg_inertia_kg_m2=0.1")).config, "corrected")
     walker = walker_of(rigid)
@@ -72,13 +72,13 @@ def systems() -> dict[str, tuple[Any, State]]:
 
 
 def walker_of(rigid: RigidModel, *sets: str) -> ContactWalker:
-    """The walker on the ground at one degree, with some keys changed."""
+    """Build the walker on the ground at one degree, with some keys changed."""
     config = loader.load(None, ("slope_deg=1", *sets)).config
     return contact_scene(config, abs(swing_foot(rigid, ANGLES)[1])).walker
 
 
 def times_ns(repeats: int) -> dict[str, float]:
-    """Nanoseconds of processor time that each right-hand side takes: medians of repeats that take turns."""
+    """Return the processor time (ns) of each right-hand side, as medians of repeats that take turns."""
     jobs: dict[str, tuple[Any, Any, Any]] = {}
     for name, (system, state) in systems().items():
         # as many different states as fit into the fastest memory, a hair apart

@@ -1,9 +1,9 @@
-"""What a sweep itself costs: memory and time of the sweeping process over points that take no time to compute.
+"""Measure the cost of a sweep itself: memory and time of the sweeping process for points that take no time.
 
     python scripts/sweep_scale.py [--points 10000 100000] [--limit-mb 500]
 
-Each point answers with the summary of a real fixed point, so that rows, files and the result are as large as real ones.
-Exit code 1 if the sweeping process needs more memory than the limit.
+Each point returns the summary of a real fixed point, so that rows, files and the result are as large as real ones. The
+exit code is 1 if the sweeping process needs more memory than the limit.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", RigidConf
 
 
 def run(config: Any, _inputs: Any, _progress: Any) -> Content:
-    """A stage: the summary of the paper's gaits, on the slope of the point."""
+    """Run the stage: return the summary of the paper's gaits, on the slope of the point."""
     return Content({}, real_summary() | {"slope_rad": config.slope_rad})
 
 
 @lru_cache
 def real_summary() -> dict[str, Any]:
-    """What `fixedpoint` says of the paper's walker."""
+    """Return the summary of `fixedpoint` for the paper's walker."""
     import walkerlab
 
     return dict(walkerlab.run("fixedpoint", runs=os.environ["SWEEP_SCALE_RUNS"]).summary)
 
 
 def main() -> None:
-    """Measure each number of points in a process of its own."""
+    """Measure each number of points in a separate process."""
     options = parsed()
     if options.one:
         measure(options.one)
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def parsed() -> argparse.Namespace:
-    """The options."""
+    """Parse the options."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--points", type=int, nargs="+", default=[10_000, 100_000])
     parser.add_argument("--limit-mb", type=float, default=500.0)
@@ -70,7 +70,7 @@ def parsed() -> argparse.Namespace:
 
 
 def measure(points: int) -> None:
-    """Sweep once, and say what it took."""
+    """Sweep once, and print memory and time."""
     from walkerlab.config.loader import load
     from walkerlab.pipeline.store.runs import RunFolder
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
@@ -91,7 +91,7 @@ def measure(points: int) -> None:
 
 
 def peak_mb() -> float:
-    """The most memory that this process has had, MB."""
+    """Return the maximum memory that this process has used (MB)."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 

@@ -1,12 +1,12 @@
-"""What a heel strike on compliant ground leaves of the trailing foot's velocity, beside the rigid model's impact.
+"""Compare the trailing foot's velocity after a heel strike on compliant ground with that of the rigid model's impact.
 
     python scripts/trailing_foot.py [--slope 4.2]
     python scripts/trailing_foot.py --config kneed
 
-The walker walks from its rigid gait to its first touch, where its knees are locked if it has any. From there SciPy's
-Radau integrates the same equations until the leading foot stops sinking in, with the impulses that both feet take. From
-the same state an impact that only the leading foot takes lets the trailing foot go freely, as the rigid model has it.
-Stiffness, damping and friction change as in flip_shift.py.
+The walker walks from its rigid gait to its first touch, at which its knees, if any, are locked. From there SciPy's
+Radau integrates the same equations, with the impulses on both feet, until the leading foot stops sinking in. For
+comparison, an impact that acts on the leading foot alone starts from the same state and releases the trailing foot, as
+in the rigid model. Stiffness, damping and friction change as in flip_shift.py.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ GROUNDS = (
     Ground(12.5, 1e-4, 100.0, 10.0, 2.0),
 )
 LEADING, TRAILING = 0, 1  # feet at the first touch
-LONGEST = 0.02  # s, that a foot sinks in for
+LONGEST = 0.02  # s, maximum time for which a foot sinks in
 HEAD = ("stiffness", "damping", "friction", "slips (m/s)", "rises (m/s)", "alone: slips", "rises", "share of impulse")
 
 
@@ -58,11 +58,11 @@ class Struck(NamedTuple):
 
     slips: float  # m/s
     rises: float  # m/s
-    share: float  # of the impulse normal to the ground that the leading foot took
+    share: float  # fraction of the leading foot's impulse normal to the ground
 
 
 def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Floats]:
-    """A config's walker on ground, with straight legs as one body each, and its state at its first touch."""
+    """Return a config's walker on its ground, with each straight leg as one body, and its state at the first touch."""
     config = config_of(ground, f"slope_deg={slope_deg!r}", "contact.terrain=after-mid-swing", of=name)
     rigid = rigid_walker(config, config.equations)
     gait = find_gaits(rigid, config.seed).gait
@@ -76,14 +76,14 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Flo
 
 
 def freed(system: OnGround, y: Floats) -> FootMotion:
-    """The trailing foot after an impact that only the leading foot takes: M dv = J' impulse, J v+ = 0."""
+    """Return the trailing foot after an impact on the leading foot alone: M dv = J' impulse, J v+ = 0."""
     form, n = system.form, int(system.form.bodies)
     s, c, F, U, unused = np.zeros((5, n))
     M, masses = np.zeros((n, n)), np.diag([float(form.mass)] * (2 + n))
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[4 + n :], M, unused)
     masses[2:, 2:] = M
-    # how fast the leading foot slips and sinks, by each velocity
+    # maps velocities to the slip and sinking of the leading foot
     projections(form.foot_x[LEADING], form.foot_y[LEADING], n, s, c, F, U)
     J = np.array([motion_gradient(form, LEADING, F, U, y, 2 + n + i)[1:] for i in range(2 + n)]).T
     v = y[2 + n :]
@@ -118,7 +118,7 @@ def strike(system: OnGround, y: Floats) -> Struck:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--config", default="paper", help="name of a built-in one")
     parser.add_argument("--slope", type=float, help="deg; 4.2 for the paper's walker, else the config's")

@@ -1,10 +1,10 @@
-"""Turn the treadmill walk of GaitAnalysisToolKit into angles of both legs, as `identify` reads them.
+"""Convert the treadmill walk of GaitAnalysisToolKit to angles of both legs, in the form that `identify` reads.
 
 Usage: python scripts/treadmill_walk.py RAWDATA [FILE, docs/downloads/treadmill.csv by default]
 
 RAWDATA is gaitanalysis/octave/2d_inverse_dynamics/test/rawdata.txt of its source distribution (Apache-2.0): planar
 markers of the right side of a person at 100 Hz. A leg is the line from the trochanter to the ankle. The left leg was
-not recorded; it is taken to do the same half a stride later.
+not recorded, and is assumed to do the same half a stride later.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""What two versions of the package take for the same work, measured in turn: compiling, commands, and warm calls."""
+"""Compare the times of two versions of the package for the same work: compiling, commands, and warm calls."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from typing import Any
 
 WALKERLAB = ("-m", "walkerlab")
 BARE = ("-c", "import numpy, numba, h5py, pydantic, typer, ruamel.yaml")
-# from nothing compiled on, each after those before it
+# cold commands, in this order, starting without compiled code
 COLD = (
     ("cold: fixedpoint", (("fixedpoint",),)),
     ("cold: contact-sim after it", (("contact-sim",),)),
     ("cold: both of kneed after that", (("fixedpoint", "-c", "kneed"), ("contact-sim", "-c", "kneed"))),
 )
-# commands whose own time is in what they print, start-up left out
+# commands that print their own time, without start-up
 STAGES = (
     ("basin, rigid, 300 x 300", ("basin", "--set", "basin.cells=[300,300]", "--set", "basin.refine=1")),
     ("basin, contact, 12 x 12", ("basin", "--set", "basin.model=contact", "--set", "basin.cells=[12,12]")),
@@ -31,7 +31,7 @@ STAGES = (
 )
 PROCESSES = "fixedpoint --force, as a process"
 BARE_IMPORTS = "bare imports"
-SAMPLES, SAMPLE_S = 5, 0.05  # of each warm call in one process; calls are repeated for so long
+SAMPLES, SAMPLE_S = 5, 0.05  # number of samples of each warm call in one process, and time for which calls are repeated
 WARM = """
 import json, sys
 sys.path[:0] = {folders!r}
@@ -42,10 +42,10 @@ Times = dict[str, list[float]]
 
 
 def print_speed(versions: Sequence[Any], wanted: str, rounds: int) -> None:
-    """Measure both versions in turn, and print a table: best and median of each, and their ratios."""
+    """Measure both versions in turn, and print a table with best and median of each, and their ratios."""
     times: list[Times] = [{}, {}]
     for lap in range(rounds):
-        # who goes first changes, lest one always finds the machine as the other left it
+        # The versions take turns in going first, because each finds the machine as the other left it.
         for place in (0, 1) if lap % 2 == 0 else (1, 0):
             for figure, seconds in measured(versions[place], wanted):
                 times[place].setdefault(figure, []).append(seconds)
@@ -63,7 +63,7 @@ def print_speed(versions: Sequence[Any], wanted: str, rounds: int) -> None:
 
 
 def measured(version: Any, wanted: str) -> Iterator[tuple[str, float]]:
-    """Each figure of a version, once (warm calls: several samples), and its seconds."""
+    """Yield the name and the seconds of each figure of a version, once, or several samples for warm calls."""
     with tempfile.TemporaryDirectory(prefix="walkerlab-speed-") as folder:
         if any(re.search(wanted, figure) for figure, _ in COLD):
             cold = replace(version, cache=Path(folder) / "cache")
@@ -83,7 +83,7 @@ def measured(version: Any, wanted: str) -> Iterator[tuple[str, float]]:
 
 
 def printed(version: Any, arguments: Sequence[str], folder: str) -> str:
-    """What a process of a version prints."""
+    """Return the output of a process of a version."""
     command = [version.python, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, env=version.environment(), cwd=folder)
     if done.returncode:
@@ -92,14 +92,14 @@ def printed(version: Any, arguments: Sequence[str], folder: str) -> str:
 
 
 def seconds(version: Any, arguments: Sequence[str], folder: str) -> float:
-    """How long a process of a version takes."""
+    """Return the time of a process of a version."""
     start = time.perf_counter()
     printed(version, arguments, folder)
     return time.perf_counter() - start
 
 
 def told_seconds(version: Any, line: Sequence[str], folder: str) -> float:
-    """How long a command that is warm says its work took, on one core."""
+    """Return the seconds that a warm command states for its work, on one core."""
     before = ("fixedpoint",) if line[0] == "basin" else None
     common = ("--runs", f"{folder}/warm", "--jobs", "1", "-q")
     if before:
@@ -109,12 +109,12 @@ def told_seconds(version: Any, line: Sequence[str], folder: str) -> float:
 
 
 def warm_times(wanted: str) -> Times:
-    """Seconds of warm calls in this process, samples of each; either version has its own scripts/benchmark.py."""
+    """Return samples of the seconds of warm calls in this process. Each version has its own scripts/benchmark.py."""
     return {figure: samples_of(work()) for figure, work in warm_work().items() if re.search(wanted, figure)}
 
 
 def warm_work() -> dict[str, Callable[[], Callable[[], Any]]]:
-    """What makes each piece of warm work."""
+    """Return functions that prepare each piece of warm work."""
     import benchmark
 
     import walkerlab
@@ -143,7 +143,9 @@ def warm_work() -> dict[str, Callable[[], Callable[[], Any]]]:
 
 
 def samples_of(work: Callable[[], Any]) -> list[float]:
-    """Seconds of one call, several times, each the mean over calls that fill a moment; the first one is not counted."""
+    """Return several samples of the seconds of a call, each the mean over calls that fill a moment. The first is not
+    counted.
+    """
     work()
     start = time.perf_counter()
     work()

@@ -62,25 +62,28 @@ from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 
 Draw = np.random.Generator
 STEPS = 10
-ASIDE = 1e-6  # of starts from the gait, in units of leg length and gravity
+ASIDE = 1e-6  # distance of starts from the gait, in units of leg length and gravity
 STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
-AGREES = 1e-4  # of traces, in parts of the derivative's size: rounding by ASIDE, and what is left of curvature
-IMPULSES = 1e-8  # N s, of a walker of some kilograms
-COSTS = 1e-7  # relative, of an integral whose power has a kink at each turn of the legs
+AGREES = 1e-4  # allowed difference of traces, relative to the derivative: rounding over ASIDE, and curvature
+IMPULSES = 1e-8  # N s, allowed difference of impulses for a walker of some kilograms
+COSTS = 1e-7  # relative error of an integral whose power has a kink at each turn of the legs
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
-LONGEST_SEARCH_S = 60.0  # processor time; one that takes longer hangs to a user
+LONGEST_SEARCH_S = 60.0  # processor time (s); to a user, a longer search seems to hang
 SETTINGS = SearchSettings(random_starts=30)
 FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
-RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11, grown by an unstable gait's multipliers
+RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11 times the multipliers of an unstable gait
 OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60  # drawn where nothing is found, tried of those that walk; steps each
-ROUGH_WALKERS, ROUGH_STEPS = 10, 4  # of a type, and of each of their walks, which take SciPy some seconds
+ROUGH_WALKERS, ROUGH_STEPS = (
+    10,
+    4,
+)  # number of walkers of a type, and of steps of each walk, which take SciPy some seconds
 ROUGHEST, SLOWEST, FASTEST = 0.01, 0.75, 1.05  # of the leg length; of the gait's rates, at the start
-SAME_TIME = 1e-6  # s, of touches
+SAME_TIME = 1e-6  # s, allowed difference of touch times
 SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
 
 
 def straight_legs(draw: Draw) -> StraightLegs:
-    """Arc or point feet, the centre of mass off the leg's line."""
+    """Draw a walker with arc or point feet, and centres of mass off the line of the legs."""
     radius = float(draw.choice((0.0, draw.uniform(0.02, 0.4))))
     return StraightLegs(
         type="straight-legs",
@@ -96,7 +99,7 @@ def straight_legs(draw: Draw) -> StraightLegs:
 
 
 def kneed(draw: Draw, at_heel_strike: Literal["locked", "free"] = "locked") -> Kneed:
-    """Light shanks, knees around mid leg."""
+    """Draw a walker with light shanks, and knees around the middle of the legs."""
     upper = draw.uniform(0.4, 0.6)
     return Kneed(
         type="kneed",
@@ -119,12 +122,12 @@ def kneed(draw: Draw, at_heel_strike: Literal["locked", "free"] = "locked") -> K
 
 
 def kneed_free(draw: Draw) -> Kneed:
-    """The same with the trailing knee free during the heel strike."""
+    """Draw the same with the trailing knee free during the heel strike."""
     return kneed(draw, "free")
 
 
 def kneed_with_torso(draw: Draw) -> Kneed:
-    """Shanks of up to a third of their thighs' mass, and an upper body."""
+    """Draw a walker with shanks of up to a third of the mass of the thighs, and an upper body."""
     upper = draw.uniform(0.35, 0.65)
     return Kneed(
         type="kneed",
@@ -147,7 +150,7 @@ def kneed_with_torso(draw: Draw) -> Kneed:
 
 
 def torso(draw: Draw) -> CompassWalker:
-    """The compass with an upper body."""
+    """Draw a compass with an upper body."""
     return CompassWalker(
         leg_mass_kg=5.0,
         foot_to_mass_m=draw.uniform(0.3, 0.7),
@@ -161,7 +164,7 @@ def torso(draw: Draw) -> CompassWalker:
 
 
 def parts(draw: Draw) -> PartsWalker:
-    """A kneed walker that no type describes: a particle on each shank, the soles' arcs off the legs' lines."""
+    """Draw a kneed walker of no built-in type: a particle on each shank, and soles off the line of the legs."""
     upper, radius = draw.uniform(0.4, 0.6), draw.uniform(0.0, 0.2)
     thigh = {"mass_kg": 0.5, "centre_m": [draw.uniform(-0.01, 0.01), -upper * draw.uniform(0.4, 0.8)]}
     shank = {"mass_kg": draw.uniform(0.02, 0.1), "centre_m": [0.0, draw.uniform(-0.2, -0.1)]}
@@ -183,7 +186,7 @@ def parts(draw: Draw) -> PartsWalker:
 
 
 def light_hips(draw: Draw) -> CompassWalker:
-    """A hip no heavier than a leg, whose mass lies within a quarter of its length from the foot."""
+    """Draw a hip no heavier than a leg, whose mass lies within a quarter of its length from the foot."""
     return CompassWalker(
         leg_length_m=1.0,
         foot_to_mass_m=draw.uniform(0.02, 0.25),
@@ -194,7 +197,7 @@ def light_hips(draw: Draw) -> CompassWalker:
 
 
 def torque_and_spring(draw: Draw) -> dict[str, Any]:
-    """A constant torque and a spring at the hip, by fields of the rigid model."""
+    """Draw a constant torque and a spring at the hip, as fields of the rigid model."""
     return {"hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
 
 
@@ -212,18 +215,18 @@ TYPES: dict[str, Callable[[Draw], AnyWalker]] = {
 
 @dataclass
 class Tally:
-    """How the searches of one type ended."""
+    """Results of the searches for one type of walker."""
 
     ends: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
-    steps_seen: int = 0  # whose effect was held against the multipliers
-    short_landings: int = 0  # walks on rough ground that end with a foot just ahead of the other
-    overlooked: int = 0  # searches that find none where another method finds a gait
+    steps_seen: int = 0  # number of steps whose effect was compared with the multipliers
+    short_landings: int = 0  # number of walks on rough ground that end with one foot just ahead of the other
+    overlooked: int = 0  # number of searches without a gait where another method finds one
 
 
 def tally(name: str, walkers: int, seed: int) -> Tally:
-    """Search the gaits of so many random walkers of a type."""
+    """Search the gaits of this number of random walkers of a type."""
     draw, found = np.random.default_rng(seed), Tally()
     for index in range(walkers):
         light = name == "light-hips"
@@ -234,7 +237,7 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
             walker = walker.changed(**torque_and_spring(draw))
         start = time.process_time()
         search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
-        # the first of a type compiles
+        # The first search of a type compiles.
         spent = time.process_time() - start if index else 0.0
         found.slowest_s = max(found.slowest_s, spent)
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
@@ -252,14 +255,14 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
 
 
 def end_of(search: GaitSearch) -> str:
-    """What a search came to."""
+    """Describe the result of a search."""
     if search.gait is None:
         return "only gaits that cannot be walked" if search.gaits else "none found"
     return "a stable gait" if search.gait.stable else "an unstable gait"
 
 
 def overlooks(walker: RigidModel) -> bool:
-    """Whether another method finds a gait of a walker of which a search finds none."""
+    """Whether another method finds a gait of a walker for which a search finds none."""
     search = Search(walker)
     looking, still = search.looking, search.walker.slope + search.walker.lean
     section = strike_section(search.walker)
@@ -282,7 +285,7 @@ def overlooks(walker: RigidModel) -> bool:
 
 
 def judged(walker: RigidModel, search: GaitSearch) -> tuple[list[str], int]:
-    """What is wrong with what was found, and over how many steps the chosen gait's multipliers were seen."""
+    """Return the faults of a search's result, and the number of steps over which multipliers were checked."""
     if search.gait is None:
         return ([] if search.reason else ["no gait and no reason"]), 0
     faults = [f"the chosen gait cannot be walked: {objection}" for objection in search.gait.objections]
@@ -297,7 +300,9 @@ def judged(walker: RigidModel, search: GaitSearch) -> tuple[list[str], int]:
 
 
 def impulse_faults(assembly: Assembly, walker: RigidModel, search: GaitSearch) -> list[str]:
-    """Gaits whose heel strike needs another impulse than the masses' momentum says, or a pull without an objection."""
+    """Yield gaits whose heel strike needs another impulse than the momentum of the masses requires, or an unreported
+    pull.
+    """
     faults = []
     for gait in search.gaits:
         step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
@@ -311,7 +316,9 @@ def impulse_faults(assembly: Assembly, walker: RigidModel, search: GaitSearch) -
 
 
 def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
-    """Gaits whose cost of transport is not that of gravity's work and the torque's positive work integrated plainly."""
+    """Yield gaits whose cost of transport differs from a plain integral of gravity's work and the positive work of the
+    torque.
+    """
     faults = []
     for gait in search.gaits if walker.hip[2] != 0.0 else ():
         step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
@@ -323,7 +330,9 @@ def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
 
 
 def rough_walk(walker: RigidModel, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
-    """What is wrong with a walk over random heights from near a gait, and whether a foot landed just ahead in it."""
+    """Return the fault of a walk over random heights from near a gait, and whether a foot landed just ahead of the
+    other.
+    """
     n, nearest = len(gait.state) // 2, SHORTEST_LANDING * gait.step_length
     share = draw.uniform(SLOWEST, FASTEST)
     start = (*gait.state[:n], *(share * rate for rate in gait.state[n:]))
@@ -343,7 +352,7 @@ def rough_walk(walker: RigidModel, gait: RigidGait, draw: Draw) -> tuple[list[st
 
 
 def ordinary_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
-    """What is wrong with the two ordinary gaits, the one chosen among them."""
+    """Yield faults of the two ordinary gaits, the chosen one among them."""
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
     faults = [f"no gait from the {name}" for name, gaits in found.items() if not gaits]
     if not faults and found[LONG_PERIOD] == found[SHORT_PERIOD]:
@@ -359,16 +368,17 @@ def ordinary_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
 
 
 def traces(walker: RigidModel, gait: RigidGait) -> Iterator[tuple[float, float, float]]:
-    """For one step, two, ... ten: trace of the derivative seen, the multipliers' sum of powers, the derivative's size.
+    """Yield for one to ten steps the trace of the observed derivative, the sum of powers of multipliers, and the
+    derivative's size.
 
-    Ends where the starts' distance from the gait outgrows what is linear, or a walk ends.
+    Ends where the distance of the starts from the gait is no longer linear, or a walk ends.
     """
     unit, units = unit_walker(walker)
     n = len(gait.state) // 2
     z = coordinates_of(unit, (*gait.state[:n], *(rate * units.time for rate in gait.state[n:])))
     whole, half = (differences(unit, z, aside) for aside in (ASIDE, 0.5 * ASIDE))
     for k in range(min(len(whole), len(half))):
-        # what a walk bends over this distance falls with its square
+        # The effect of curvature falls with the square of this distance.
         seen = (4.0 * half[k] - whole[k]) / 3.0
         size = float(np.linalg.norm(seen))
         if size * ASIDE > STILL_LINEAR:
@@ -377,14 +387,16 @@ def traces(walker: RigidModel, gait: RigidGait) -> Iterator[tuple[float, float, 
 
 
 def differences(walker: RigidModel, z: NDArray[np.float64], aside: float) -> NDArray[np.float64]:
-    """(steps, d, d) what walks from either side of z part by, per unit of the distance between their starts."""
+    """Return (steps, d, d) the differences between walks from either side of z, per unit of the distance of their
+    starts.
+    """
     pairs = [(walked(walker, z + move), walked(walker, z - move)) for move in aside * np.eye(z.size)]
     steps = min(len(walk) for pair in pairs for walk in pair)
     return np.array([[(ahead[k] - behind[k]) / (2.0 * aside) for ahead, behind in pairs] for k in range(steps)])
 
 
 def walked(walker: RigidModel, z: NDArray[np.float64]) -> list[Any]:
-    """Section coordinates after each of ten steps from z."""
+    """Return section coordinates after each of ten steps from z."""
     tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
     return [
         coordinates_of(walker, y)
@@ -396,7 +408,7 @@ ENDS = ("a stable gait", "an unstable gait", "only gaits that cannot be walked",
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the campaign; the exit code."""
+    """Run the campaign, and return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--walkers", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,6 @@
-"""What a warm `walkerlab simulate` takes as a whole process, beside a bare process that does no more than it must."""
+"""Compare the time of a warm `walkerlab simulate` as a whole process with that of a bare process that does only the
+work.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import time
 from pathlib import Path
 from statistics import median
 
-# imports what a walk needs, calls its compiled kernel, writes its numbers
+# imports only what a walk needs, calls its compiled kernel, and writes the numbers
 BARE = """
 import sys
 import h5py
@@ -27,9 +29,9 @@ with h5py.File(sys.argv[1], "w") as file:
 
 
 def whole_process_times(repeats: int) -> tuple[float, float]:
-    """Seconds of `walkerlab simulate` and of the bare process, medians of so many of each in turn.
+    """Return the seconds of `walkerlab simulate` and of the bare process, as medians of repeats that take turns.
 
-    The gait is there already, as it is for a user who changes how far to walk; the walk itself is done each time.
+    The gait exists already, as for a user who changes the number of strides, but the walk is computed each time.
     """
     with tempfile.TemporaryDirectory() as folder:
         runs = Path(folder)
@@ -46,7 +48,7 @@ def whole_process_times(repeats: int) -> tuple[float, float]:
 
 
 def seconds(command: list[str]) -> float:
-    """How long a process takes."""
+    """Return the time of a process."""
     start = time.perf_counter()
     subprocess.run(command, check=True, capture_output=True)
     return time.perf_counter() - start

@@ -41,3 +41,23 @@ def measure_angles(walker, start, rng, steps=10, rate_change=0.0, noise=3.5e-3, 
     swapped = np.searchsorted(strikes[:, 0], times) % 2 == 1
     angles[swapped] = angles[swapped, ::-1]
     return times, angles + rng.normal(0.0, noise, angles.shape), np.append(0.0, strikes[:, 0])
+
+
+def measure_limp(plain, start, rng, steps=20, roughness=1e-4, noise=1e-3):
+    """Return periods (s) and lengths (m) of the steps of a plain unequal walker over a rough floor, with noise."""
+    walked, _ = plain.stride(start, rng.normal(0.0, roughness, steps))
+    return (walked + rng.normal(0.0, noise, walked.shape)).T
+
+
+def measure_limping_angles(plain, start, rng, steps=10, noise=3.5e-3, rate_hz=240.0):
+    """Return times (samples,) and angles (samples, 2) from the vertical of leg 1 and leg 2 with noise (rad).
+
+    plain  an unequal walker without knees
+    """
+    swings = []
+    walked, _ = plain.stride(start, [0.0] * steps, swings=swings)
+    touches = np.append(0.0, np.cumsum(walked[:, 0]))
+    times = np.arange(0.0, touches[-1], 1.0 / rate_hz)
+    step = np.searchsorted(touches, times, "right") - 1
+    angles = np.array([swings[k](t - touches[k])[[k % 2, 1 - k % 2]] for k, t in zip(step, times, strict=True)])
+    return times, angles - plain.slope + rng.normal(0.0, noise, angles.shape)

@@ -169,10 +169,11 @@ class Walker:
         damping = self.knee_damping[k]
         return Swing(self.legs[k], self.legs[1 - k], self.hip_mass, self.slope, self.gravity, free_shank, damping)
 
-    def step(self, k, q, w, rise=0.0):
+    def step(self, k, q, w, rise=0.0, swings=None):
         """Return duration, length, angles and rates after a step of leg k, from those of swing and stance leg.
 
-        The foot lands on a foothold `rise` (m) above the stance foot's.
+        The foot lands on a foothold `rise` (m) above the stance foot's. The solution of the straight swing is appended
+        to `swings`, if given.
         """
         bent_s, start = 0.0, q[1]
         if len(self.legs[k].segments) == 2:
@@ -181,6 +182,8 @@ class Walker:
         run = integrate(system, np.append(q, w), lambda t, y: system.foot_height(t, y) - rise, -1.0)
         landing = next(place for place, y in enumerate(run.y_events[0]) if system.foot_ahead(y) > 0.0)
         y = run.y_events[0][landing]
+        if swings is not None:
+            swings.append(run.sol)
         length = system.foot_ahead(y) + system.standing.radius * (start - y[1])
         return bent_s + run.t_events[0][landing], length, y[1::-1], self.strike(k, y[:2], y[2:])
 
@@ -217,15 +220,15 @@ class Walker:
 
         return linear_solve(balance, 2)
 
-    def stride(self, state, rises=(0.0, 0.0), first=0):
+    def stride(self, state, rises=(0.0, 0.0), first=0, swings=None):
         """Return both steps' (duration, length) and the state after them, from a state just after a heel strike.
 
-        Leg `first` swings first, and the footholds rise by `rises` (m).
+        Leg `first` swings first, and the footholds rise by `rises` (m). `swings` is as in `step`.
         """
         n, steps = len(state) // 2, []
         q, w = np.array(state[:2]) + self.slope, np.array(state[n : n + 2])
         for k, rise in enumerate(rises, first):
-            duration, length, q, w = self.step(k % 2, q, w, rise)
+            duration, length, q, w = self.step(k % 2, q, w, rise, swings)
             steps.append((duration, length))
         return np.array(steps), np.append(q - self.slope, w)
 
@@ -234,5 +237,5 @@ def integrate(system, y, event, direction):
     """Integrate up to three seconds and return the run with all zeros of an event function."""
     event_of = lambda t, y: event(t, y)  # noqa: E731 (functions of classes take no attributes)
     event_of.direction = direction
-    settings = {"rtol": 1e-12, "atol": 1e-12, "max_step": 0.05}
+    settings = {"rtol": 1e-12, "atol": 1e-12, "max_step": 0.05, "dense_output": True}
     return solve_ivp(system.rates, (0.0, 1.5), y, "DOP853", events=event_of, **settings)

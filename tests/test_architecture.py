@@ -17,8 +17,8 @@ LAYERS = (
     "api",
     "evidence.verification",
     "evidence.benchmarks",
-    "evidence.check",
     "evidence.paper",
+    "evidence.check",
     "views.cli",
     "views.explore",
     "views.report",
@@ -109,7 +109,7 @@ def exceptions(found, paths=IN_LAYERS):
     return {named(path): names for path in paths if (names := found(path))}
 
 
-def test_imports_run_downward():
+def test_modules_import_only_from_lower_layers():
     assert exceptions(lambda path: imported_layers(path) & {*LAYERS[: LAYERS.index(layer_of(path))]}) == {}
 
 

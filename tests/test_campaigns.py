@@ -37,10 +37,10 @@ def kill():
     return script("kill_campaign")
 
 
-def test_fuzzed_configs_walk_or_raise_config_error(fuzz):
+def test_fuzzed_configs_are_simulated_or_raise_config_error(fuzz):
     fates, wrong = fuzz.fuzz_configs(150, seed=1)
     assert wrong == []
-    assert fates["refused with its place"] > 20
+    assert fates["refused with its position"] > 20
     assert sum(fates.values()) == 150
 
 

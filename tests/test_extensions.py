@@ -184,7 +184,7 @@ def energy(law, d):
 """
 
 
-def test_walk_on_the_normal_force_of_an_extension_balances_its_energy(site):
+def test_energy_balances_with_the_normal_force_of_an_extension(site):
     declaration = "Extension(1, normal_force={'hunt-crossley': 'hunt_crossley_law:HuntCrossley'})"
     add(site.packages, "hunt-crossley", f"from walkerlab.extensions import Extension\nEXTENSION = {declaration}\n")
     (site.packages / "hunt_crossley_law.py").write_text(HUNT_CROSSLEY)
@@ -251,7 +251,7 @@ def install_rods(site, module=RODS):
     (site.packages / "rods_walker.py").write_text(module)
 
 
-def test_walker_type_of_an_extension_walks_as_its_parts_do(site):
+def test_walker_type_of_an_extension_walks_like_its_parts(site):
     install_rods(site)
     (site.folder / "rods.yaml").write_text("name: rods\nslope_deg: 3\nwalker: {type: rods, leg_mass_kg: 4}\n")
     equal = {"leg_length_m": 1.0, "leg_mass_kg": 4.0, "leg_mass_below_hip_m": 0.5, "leg_inertia_kg_m2": 4.0 / 12.0}

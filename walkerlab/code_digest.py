@@ -34,8 +34,8 @@ class Sources:
     def code_digest(self, *names: str) -> str:
         """Return the SHA-256 of modules and of everything they import from their own packages or this one.
 
-        Data files of those packages (templates, tables) count too, but not this package's `__init__`, since a new
-        version number changes no result. Raises ModuleNotFoundError if there is no such module.
+        Data files of those packages, such as templates and tables, are included. This package's `__init__` is not,
+        since a new version number changes no result. Raises ModuleNotFoundError if there is no such module.
         """
         closure = self.closure(*names)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}

@@ -90,7 +90,7 @@ class StorageError(WalkerlabError):
 
 
 class StaleError(WalkerlabError):
-    """An artifact is stale or missing (`status --check`)."""
+    """A stored result is out of date or missing (`status --check`)."""
 
     exit_code = 5
 

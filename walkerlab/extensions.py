@@ -182,14 +182,16 @@ def words(key: str) -> tuple[str, ...]:
     return (*WORDS[key], *declared(key))
 
 
-def foreign() -> tuple[Found, ...]:
+def external_extensions() -> tuple[Found, ...]:
     """Return the extensions of other packages, including those that are left out."""
     return tuple(found for found in registry() if found.source)
 
 
 def origin_of(key: str) -> str:
     """Describe which values of a config key come from other packages, or return '' if none do."""
-    origins = ((found, word) for found in foreign() if found.extension for word in found.extension.words(key))
+    origins = (
+        (found, word) for found in external_extensions() if found.extension for word in found.extension.words(key)
+    )
     return "".join(f"; {word}: extension {found.name} ({found.source})" for found, word in origins)
 
 
@@ -219,7 +221,7 @@ def versions() -> str:
     """Describe the usable extensions of other packages: names, versions and code digests, or return '' without any."""
     sources = Sources()
     described = []
-    for found in foreign():
+    for found in external_extensions():
         if found.extension is not None:
             modules = {code.partition(":")[0] for code in (found.code, *found.extension.code())}
             described.append(f"{found.name}: {found.origin} (code {sources.code_digest(*modules)[:8]})")

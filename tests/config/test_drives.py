@@ -29,7 +29,7 @@ def test_invalid_drives_are_rejected(asked):
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "parts"])
-def test_walkers_of_every_type_are_driven(name):
+def test_walkers_of_every_type_can_be_driven(name):
     sets = (PUSH, "walker.hip.spring_N_m_per_rad=0.01", "walker.hip.damping_N_m_s_per_rad=0.02")
     assert acting_on(load(Path(name)).config) == ()
     driven = load(Path(name), sets).config

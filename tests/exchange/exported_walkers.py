@@ -42,6 +42,10 @@ LIMPING = (
     ),
 )  # fmt: skip
 """Walkers whose legs differ: one of each kind."""
+ONE_KNEE = (
+    "one-knee", "strides=1",
+    "contact={stiffness: 300000, damping: 270, terrain: checkerboard, stiction_velocity: 10, friction_velocity: 100}",
+)  # fmt: skip
 PARTS = """
 name: compass-by-parts
 walker:

@@ -395,7 +395,7 @@ def test_jump_of_leg_length_is_reported(tmp_path):
     assert "The length of HIP>FOOT1 is off at samples 251 to 262" in refused.value.message
 
 
-def test_a_leg_whose_length_changes_along_the_walk_is_named(tmp_path):
+def test_leg_whose_length_changes_along_the_walk_is_reported(tmp_path):
     places = places_of(sampled()[1])
     grows = 1.0 + 0.05 * np.linspace(0.0, 1.0, len(places))[:, None]
     places[:, 1] = places[:, 0] + grows * (places[:, 1] - places[:, 0])
@@ -412,7 +412,7 @@ def test_swapped_feet_with_sideways_distance_are_corrected(first, tmp_path):
     assert f"The legs are swapped at samples {first + 1} to {first + 10}" in summary["doubts"][0]
 
 
-def test_running_is_reported(tmp_path):
+def test_running_is_rejected(tmp_path):
     """A runner's hip is lowest as the legs pass each other."""
     places = places_of(sampled()[1])
     spread = np.abs(places[:, 1, 0] - places[:, 2, 0])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported_walkers import LIMPING, PADS, PARTS, export_of, files_of, with_gait
+from exported_walkers import LIMPING, ONE_KNEE, PADS, PARTS, export_of, files_of, with_gait
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
@@ -244,7 +244,7 @@ def test_kneed_walker_takes_the_same_steps_with_the_exported_script(walker, step
     assert lengths == pytest.approx(walk.lengths_m[:steps], rel=0.01)
 
 
-@pytest.mark.parametrize("walker", LIMPING, ids=lambda walker: walker[0])
+@pytest.mark.parametrize("walker", [*LIMPING, ONE_KNEE], ids=lambda walker: walker[0])
 def test_walker_whose_legs_differ_takes_the_same_steps_in_mujoco(walker, tmp_path):
     walk = export_of(*walker).walk
     periods, lengths = steps_of(walk_of(tmp_path, *walker), walk.steps)
@@ -278,7 +278,7 @@ def test_locked_knee_stays_straight_under_load(tmp_path):
 
 
 @pytest.mark.parametrize("walker", [KNEED, KNEED_TORSO], ids=["kneed", "torso"])
-def test_knee_lock_is_the_same_plastic_impact(walker, tmp_path):
+def test_knee_lock_in_mujoco_equals_our_plastic_impact(walker, tmp_path):
     """Velocities after the lock are those of `lock_knee`, to the time step in which the knee became straight."""
     export, walk = export_of(*walker), walk_of(tmp_path, *walker)
     data, lock = walk.data, walk.lock
@@ -300,7 +300,7 @@ def test_knee_lock_is_the_same_plastic_impact(walker, tmp_path):
     assert np.abs(after - before).max() > 1.0
 
 
-def test_knee_stop_in_mujoco_has_the_torque_of_ours():
+def test_knee_stop_in_mujoco_has_the_same_torque_as_ours():
     """MuJoCo scales a limit by `dof_invweight0`; the torque at a given extension and rate is that of our stop."""
     export, model = export_of(*STOPPED), model_of(*STOPPED)
     data = mujoco.MjData(model)

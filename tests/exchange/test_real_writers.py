@@ -292,7 +292,7 @@ def test_poses_of_movement_may_name_their_individual(tmp_path):
     walk_right(tmp_path, "film.csv", columns=columns, fps=FPS, min_likelihood=0.6)
 
 
-def test_a_data_frame_as_deeplabcut_writes_it_is_read(tmp_path):
+def test_data_frame_in_deeplabcut_layout_is_read(tmp_path):
     pandas = pytest.importorskip("pandas", reason="pandas is not installed")
     header = [("net", part, axis) for part in ("HIP", "FOOT1", "FOOT2") for axis in ("x", "y", "likelihood")]
     names = pandas.MultiIndex.from_tuples(header, names=["scorer", "bodyparts", "coords"])
@@ -370,7 +370,7 @@ def test_dates_and_times_of_polars_are_seconds(tmp_path):
 # C3D and OpenSim
 
 
-def test_a_walk_of_ezc3d_in_millimetres_is_read(tmp_path):
+def test_c3d_file_in_millimetres_is_read(tmp_path):
     ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
     content = ezc3d.c3d()
     for name, value in {"RATE": [FPS], "LABELS": ["HIP", "FOOT1", "FOOT2"], "UNITS": ["mm"]}.items():

@@ -98,7 +98,7 @@ def test_a_line_may_have_a_constant_but_no_sign(tmp_path):
 
 
 @pytest.mark.parametrize("stated", [1.5, "free"])
-def test_a_tilt_of_the_camera_is_taken_off(stated, tmp_path):
+def test_tilt_of_the_camera_is_subtracted(stated, tmp_path):
     time, angle = sampled()
     exact = stated == 1.5
     summary = read(tmp_path, time, angle + TILT, camera_tilt_deg=stated)
@@ -114,7 +114,7 @@ def test_angles_from_the_floor_are_turned_by_the_slope(tmp_path):
     assert all_steps_are_right(read(tmp_path, time, angle + SLOPE, camera_tilt_deg="floor"))
 
 
-def test_a_level_camera_is_found_level(tmp_path):
+def test_level_camera_has_no_estimated_tilt(tmp_path):
     summary = read(tmp_path, *sampled(noise=1e-3), camera_tilt_deg="free")
     tilt = float(summary["doubts"][0].split()[4])
     assert abs(tilt) < 0.05
@@ -171,7 +171,7 @@ def test_frames_become_times_by_their_rate(name, tmp_path):
         assert "--fps" in refused.value.advice
 
 
-def test_a_film_in_slow_motion_gets_its_true_times(tmp_path):
+def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
     time, angle = sampled(fps=240.0)
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", zip(8.0 * time, *angle.T, strict=True))
     doubts = steps_of(path)["doubts"]
@@ -242,7 +242,7 @@ def test_values_whose_squares_overflow_are_gaps(tmp_path):
 # Treadmill
 
 
-def test_the_belts_speed_gives_lengths(tmp_path):
+def test_step_lengths_follow_from_the_belt_speed(tmp_path):
     """The leg is 10 % shorter than the config's."""
     speed = 0.9 * LENGTH_M / PERIOD_S
     summary = read(tmp_path, *sampled(), belt_speed_m_s=speed)
@@ -255,13 +255,13 @@ def test_the_belts_speed_gives_lengths(tmp_path):
     assert on_belt["doubts"] == []
 
 
-def test_a_table_of_periods_on_a_belt_has_lengths(tmp_path):
+def test_lengths_follow_from_periods_and_belt_speed(tmp_path):
     path = table(tmp_path, "period_s", [(p,) for p in (0.70, 0.71, 0.69, 0.70, 0.705)])
     result = walkerlab.identify(path, fit=["slope_deg"], belt_speed_m_s=0.52)
     assert "step_length_m" in result.summary["noise"]["measurement"]
 
 
-def test_a_table_of_steps_has_no_frames(tmp_path):
+def test_frame_rate_is_rejected_for_a_table_of_steps(tmp_path):
     path = table(tmp_path, "period_s", [(0.7,), (0.71,), (0.69,)])
     with pytest.raises(ConfigError, match=r"identify\.fps: a table of steps has no samples"):
         walkerlab.identify(path, fit=["slope_deg"], fps=240.0)
@@ -315,7 +315,7 @@ def test_minimum_likelihood_is_refused_for_data_without_likelihoods(tmp_path):
 
 
 @pytest.mark.parametrize("tilt", ["floor", "free"])
-def test_the_slope_is_estimated_from_angles_off_the_floors_normal(tilt, tmp_path):
+def test_slope_is_estimated_from_angles_measured_from_the_floors_normal(tilt, tmp_path):
     time, angle = sampled(fps=60.0, noise=2e-4)
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", zip(time, *(angle + SLOPE).T, strict=True))
     result = walkerlab.identify(path, fit=["slope_deg"], level="angles", camera_tilt_deg=tilt)

@@ -22,7 +22,7 @@ def with_page_early(graph):
 
 
 @pytest.mark.parametrize("sets", [(), (STEEP,)])
-def test_several_processes_give_the_same_result_and_all_end(toy, tmp_path, sets):
+def test_several_processes_give_the_serial_result_and_leave_no_worker_behind(toy, tmp_path, sets):
     one = toy.execute("page", *sets)
     files = {name: one.run_dir / f"{name}.h5" for name in NUMBERS}
     digests = {name: read(path).digest() for name, path in files.items() if path.exists()}

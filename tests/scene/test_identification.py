@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
@@ -15,7 +16,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.result import USABLE
 from walkerlab.physics.orbits.step_map import StepMap
-from walkerlab.scene.identification import identify_walk, problem_of
+from walkerlab.scene.identification import ConfigFamily, gait_start, identify_walk, problem_of, step_map_of
 from walkerlab.scene.subject import find_model_gait
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "identification_coverage.py"))
@@ -132,6 +133,21 @@ def test_long_walk_is_predicted_to_its_end():
     assert walk.durations_s.size == 120
 
 
+LEGS_DIFFER = {
+    "prosthesis": ("prosthesis",),
+    "one knee": ("one-knee",),
+    "longer leg": ("round-feet", "walker.leg_2={leg_length_m: 0.4003, foot_radius_m: 0.118}"),
+}
+
+
+@cache
+def limping(name):
+    own, *sets = LEGS_DIFFER[name]
+    config = load(Path(own), sets).config
+    gait = run_in_memory("fixedpoint", config).summary
+    return find_model_gait("rigid", config, gait, lambda _: None), ConfigFamily(config, ["walker.leg_2.leg_mass_kg"])
+
+
 @pytest.mark.parametrize("name", ["round-feet", "kneed", "paper"])
 def test_tangents_of_a_walk_equal_difference_quotients(name):
     own = CAMPAIGN["Truth"](name, CAMPAIGN["WALKERS"][name])
@@ -144,6 +160,33 @@ def test_tangents_of_a_walk_equal_difference_quotients(name):
         values, others = getattr(exact, field), getattr(differences, field)
         assert values == pytest.approx(others, abs=2e-5 * np.abs(values).max()), field
     assert exact.rates == pytest.approx(differences.rates, abs=1e-4)
+
+
+@pytest.mark.parametrize("first_leg", [1, 2])
+@pytest.mark.parametrize("name", LEGS_DIFFER)
+def test_tangents_of_a_limping_walk_equal_difference_quotients(name, first_leg):
+    subject, family = limping(name)
+    walks, z = step_map_of(subject, family, first_leg), gait_start(subject, family, first_leg)
+    heights, steps = np.random.default_rng(3).normal(0.0, 3e-4, 6), 5
+    along = np.eye(z.size + steps + 1)
+    times = np.linspace(0.0, 0.999 * walks.take_disturbed_walk(z, family.start, heights).durations_s.sum(), 40)
+    exact = walks.differentiate_walk(z, family.start, heights, along, times)
+    differences = StepMap.differentiate_walk(walks, z, family.start, heights, along, times)
+    for field in ("durations_s", "lengths_m", "angles_rad", "samples_rad"):
+        values, others = getattr(exact, field), getattr(differences, field)
+        assert values == pytest.approx(others, abs=2e-5 * np.abs(values).max()), field
+    assert exact.rates == pytest.approx(differences.rates, abs=1e-4)
+
+
+def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later():
+    subject, family = limping("prosthesis")
+    walks = [step_map_of(subject, family, leg) for leg in (1, 2)]
+    first, second = (
+        each.take_disturbed_walk(gait_start(subject, family, leg), family.start, np.zeros(7))
+        for leg, each in enumerate(walks, 1)
+    )
+    assert second.durations_s[:5] == pytest.approx(first.durations_s[1:], rel=1e-10)
+    assert second.angles_rad[:5] == pytest.approx(first.angles_rad[1:], rel=1e-9)
 
 
 def test_noise_free_steps_give_the_parameters_to_many_digits():

@@ -8,9 +8,8 @@ import pytest
 from walkerlab.config.drives import drives_of
 from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
-from walkerlab.config.walkers import second_of
+from walkerlab.config.walkers import second_leg_of
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.exported import GaitStart, prepare_export
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
@@ -41,9 +40,9 @@ def gait_of(config):
     return gait
 
 
-def test_leg_2_holds_the_keys_that_differ():
+def test_keys_of_leg_2_replace_those_of_leg_1():
     walker = config_of("paper", "walker.leg_2={leg_mass_kg: 5.5, foot_to_mass_m: 0.48}").walker
-    second = second_of(walker)
+    second = second_leg_of(walker)
     assert (second.leg_mass_kg, second.foot_to_mass_m, second.leg_length_m) == (5.5, 0.48, 1.0)
     assert walker.total_mass_kg == 5.0 + 5.5 + 10.0
     first, other = assembly_of(walker).bodies
@@ -51,7 +50,7 @@ def test_leg_2_holds_the_keys_that_differ():
     assert (first.centre_m[1], other.centre_m[1]) == (-0.5, -0.52)
 
 
-def test_keys_that_a_kneed_leg_2_omits_are_those_of_leg_1():
+def test_keys_omitted_for_a_kneed_leg_2_have_the_values_of_leg_1():
     walker = config_of("kneed", KNEES).walker
     bodies = {body.name: body for body in assembly_of(walker).bodies}
     assert (bodies["shank 1"].mass_kg, bodies["shank 2"].mass_kg) == (0.05, 0.053)
@@ -59,13 +58,13 @@ def test_keys_that_a_kneed_leg_2_omits_are_those_of_leg_1():
     assert bodies["thigh 1"].mass_kg == bodies["thigh 2"].mass_kg
 
 
-def test_a_leg_2_that_is_like_leg_1_makes_no_difference():
+def test_leg_2_with_the_values_of_leg_1_changes_nothing():
     config = config_of("paper", "walker.leg_2={leg_mass_kg: 5.0}")
     assert not have_different_legs(config)
     assert rigid_walker(config) == rigid_walker(config_of("paper"))
 
 
-def test_two_descriptions_in_parts_make_legs_that_differ(tmp_path):
+def test_walker_of_parts_with_different_shanks_has_different_legs(tmp_path):
     text = builtin_config("parts").path.read_text()
     heavier = text.replace("name: shank 2, mass_kg: 0.05", "name: shank 2, mass_kg: 0.06")
     assert heavier != text
@@ -95,7 +94,7 @@ def test_dampers_at_hip_and_knees_are_refused_together():
     ("round-feet", "{leg_length_m: 0.41, foot_radius_m: 0.13, foot_centre_ahead_m: 0.01}"),
     ("kneed", "{thigh: {length_m: 0.49}, foot_radius_m: 0.05}"),
 ])  # fmt: skip
-def test_a_start_is_completed_with_both_feet_of_unequal_legs_on_the_slope(name, leg_2):
+def test_start_of_unequal_legs_is_completed_with_both_feet_on_the_slope(name, leg_2):
     values = 4 if name != "kneed" else 6
     start = ["null", "0.25", *["null"] * (values - 4), "-0.4", "-1.0", *["-0.4"] * (values - 4)]
     start = start if values == 4 else ["null", "0.25", "null", "-0.4", "-1.0", "-0.4"]
@@ -109,7 +108,7 @@ def test_a_start_is_completed_with_both_feet_of_unequal_legs_on_the_slope(name, 
 
 
 @pytest.mark.parametrize("leg_2", ["{leg_mass_kg: 5.5}", "{leg_mass_kg: 5.2, leg_length_m: 1.002}"])
-def test_a_contact_walk_on_pads_limps_into_the_contact_gait(leg_2):
+def test_walk_of_unequal_legs_on_pads_settles_on_the_contact_gait(leg_2):
     config = config_of("paper", f"walker.leg_2={leg_2}", "contact.pad_pitch=own", "strides=14")
     rigid = gait_of(config)
     gait = contact_gait(config, rigid.step_length, rigid.state).gait
@@ -185,13 +184,13 @@ def test_push_offs_of_both_legs_drive_a_gait_that_limps():
     assert gait.asymmetry["step_period"] > 1e-3
 
 
-def test_a_push_off_of_leg_2_that_is_like_that_of_leg_1_makes_no_difference():
+def test_push_off_of_leg_2_equal_to_that_of_leg_1_changes_nothing():
     config = config_of("paper", *LEVEL, "push_off={impulse_N_s: 4, leg_2: {impulse_N_s: 4}}")
     assert not have_different_legs(config)
     assert rigid_walker(config) == rigid_walker(config_of("paper", *LEVEL, "push_off.impulse_N_s=4"))
 
 
-def test_push_offs_that_differ_make_legs_that_differ():
+def test_different_push_offs_count_as_different_legs():
     config = config_of("paper", "push_off={impulse_N_s: 1, leg_2: {impulse_N_s: 2}}")
     assert have_different_legs(config)
     assert PIPELINE["tune"].why_unsuited(config) == "the legs differ"
@@ -216,17 +215,17 @@ def test_each_leg_pushes_off_with_its_own_impulse_on_compliant_ground(first, sec
 def test_stages_that_need_equal_legs_are_few():
     config = config_of("paper", HEAVY, "recording={file: walk.csv}")
     refused = [stage.name for stage in PIPELINE.stages if stage.why_unsuited(config) == "the legs differ"]
-    assert refused == ["recorded-walk", "tune", "identify", "plan"]
+    assert refused == ["tune"]
 
 
-@pytest.mark.parametrize("stage", ["tune", "identify", "plan"])
-def test_a_stage_that_needs_equal_legs_says_so(stage):
+def test_stage_that_needs_equal_legs_rejects_different_ones():
+    tune = PIPELINE["tune"]
     config = config_of("paper", HEAVY)
-    assert PIPELINE[stage].why_unsuited(config) == "the legs differ"
+    assert tune.why_unsuited(config) == "the legs differ"
     with pytest.raises(ConfigError, match="needs two equal legs") as refused:
-        PIPELINE[stage].refuse_unsuited(stage, config)
+        tune.refuse_unsuited("tune", config)
     assert "fixedpoint, simulate, contact-sim" in refused.value.advice
-    assert PIPELINE[stage].why_unsuited(config_of("paper")) is None
+    assert tune.why_unsuited(config_of("paper")) is None
 
 
 def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
@@ -242,11 +241,17 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     assert content.summary["bifurcations"] == []
 
 
-def test_walker_with_one_knee_and_a_straight_leg_cannot_be_exported():
-    config = config_of("kneed", f"walker.leg_2={PEG}")
-    assert rigid_walker(config).legs_differ
-    with pytest.raises(ConfigError, match="both with a knee or both without"):
-        prepare_export(config, GaitStart(0.4, (0.0,) * 6))
+def test_flips_of_legs_that_differ_lie_on_a_curve_over_slope_and_mass():
+    second = "{over: walker.leg_2.leg_mass_kg, from: 3.95, to: 4.05}"
+    block = f"{{over: slope_deg, from: 2.2, to: 2.35, model: rigid, periods: 2, points: 12, second: {second}}}"
+    config = config_of("prosthesis", f"continuation={block}")
+    content = continuation.run(restrict(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
+    (curve,) = content.summary["curves"]
+    assert (curve["kind"], curve["period"]) == ("flip", 2)
+    for slope_deg, mass in (curve["begins"], curve["ends"]):
+        gait = gait_of(config_of("prosthesis", f"slope_deg={slope_deg}", f"walker.leg_2.leg_mass_kg={mass}"))
+        # the last point is interpolated to the edge of the plane
+        assert gait.stride_multipliers[0] == pytest.approx(-1.0, abs=1e-4)
 
 
 ONE_KNEE_GROUND = (
@@ -273,7 +278,7 @@ def test_walker_with_one_knee_and_a_straight_leg_settles_on_its_gait_on_complian
     assert math.sqrt(abs(gait.multipliers[0])) == pytest.approx(rigid.spectral_radius, rel=0.05)
 
 
-def test_multipliers_of_one_knee_on_compliant_ground_are_those_of_differences():
+def test_multipliers_of_a_one_kneed_walker_on_compliant_ground_equal_differences():
     config = config_of("one-knee", ONE_KNEE_GROUND)
     rigid = gait_of(config)
     gait = contact_gait(config, rigid.step_length, rigid.state).gait

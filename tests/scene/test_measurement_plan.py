@@ -86,3 +86,14 @@ def test_prior_determines_what_periods_cannot(config, gait):
 def test_start_too_far_from_the_gait_has_no_plan(config, gait):
     with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
         plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))
+
+
+@pytest.mark.parametrize("model", ["rigid", "contact"])
+def test_planned_error_of_the_mass_of_leg_2_is_a_fraction_of_a_kilogram(model):
+    """A compass of equal legs; the prediction agrees with what a measured limp leaves, 0.008 kg after 20 steps."""
+    config = load(Path("paper")).config
+    gait = run_in_memory("fixedpoint", config).summary
+    question = Identify(fit={"walker.leg_2.leg_mass_kg": None}, model=model)
+    options = plan_measurements(config, gait, question, Plan(steps=4, max_steps=4))
+    (error,) = errors(options, "periods and lengths").errors.values()
+    assert 0.005 < error < 0.1

@@ -15,12 +15,18 @@ from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, stiff_gro
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.extensions import WORDS
 from walkerlab.physics.ground import friction
-from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
+from walkerlab.physics.ground.friction import (
+    FRICTION_LAWS,
+    Coulomb,
+    Frictionless,
+    friction_coefficient,
+    steepest_change,
+)
 from walkerlab.physics.orbits.contact_gait import scale_laws, set_rigidity, why_no_gait
 from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
+from walkerlab.pipeline.stages.contact_sim import warn_of_unresolved_slip
 from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.scene.contact import contact_scene, ground_laws, scene_measures, start_state
 
@@ -126,6 +132,17 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
+def test_steepest_change_bounds_a_fall_that_is_steeper_than_the_rise():
+    law = Coulomb(static=0.9, dynamic=0.7, stiction_velocity=0.1, friction_velocity=0.11)
+    span = 1e-4
+    changes = [
+        friction_coefficient(law, slip + span)[0] - friction_coefficient(law, slip)[0]
+        for slip in np.linspace(0.1, 0.11, 201)
+    ]
+    assert max(changes) == pytest.approx(0.003, rel=1e-3)
+    assert max(changes) <= steepest_change(law, span) <= 1.01 * max(changes)
+
+
 def test_friction_laws_have_different_descriptions():
     said = [ground_laws(Contact(friction=word))[1].describe() for word in FRICTION_LAWS]
     assert len(set(said)) == len(said)
@@ -157,9 +174,9 @@ def test_friction_law_too_weak_for_the_slope_explains_the_missing_gait(own):
 def test_unresolved_slip_of_any_law_is_reported(own):
     said = []
     progress = SimpleNamespace(note=said.append)
-    tell_unresolved_slip(1e-9, own, progress)
+    warn_of_unresolved_slip(1e-9, own, progress)
     assert said == []
-    tell_unresolved_slip(0.1, own, progress)
+    warn_of_unresolved_slip(0.1, own, progress)
     assert "0.3 m/s" in said[0]
 
 

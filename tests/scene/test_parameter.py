@@ -78,7 +78,7 @@ def test_models_can_be_built_at_a_nearby_value(config):
             contact_scene(changed, 0.4, 0.4)
 
 
-def test_config_at_its_current_value_is_unchanged(config):
+def test_setting_a_parameter_to_its_current_value_leaves_the_walker_unchanged(config):
     for key in (*numbers_of(config), "slope_deg"):
         parameter = parameter_of(key, config)
         again = parameter.config_at(config, parameter.value_in(config))

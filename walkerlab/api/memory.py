@@ -102,7 +102,7 @@ def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return copy_signature
 
 
-def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
+def stated_keys(keys: Mapping[str, object]) -> dict[str, Setting]:
     """Return the keys that a caller passed. None leaves a key at its default."""
     return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
 
@@ -135,7 +135,7 @@ def compass(**keys: Unpack[CompassKeys]) -> CompassWalker:
     >>> compass(hip_mass_kg=20).total_mass_kg
     30.0
     """
-    return cast(CompassWalker, walker("compass", **passed(keys)))
+    return cast(CompassWalker, walker("compass", **stated_keys(keys)))
 
 
 @shows(KneedKeys)
@@ -150,7 +150,7 @@ def kneed(**keys: Unpack[KneedKeys]) -> Kneed:
     >>> kneed(hip_mass_kg=1.0).total_mass_kg
     2.1
     """
-    return cast(Kneed, walker("kneed", **passed(keys)))
+    return cast(Kneed, walker("kneed", **stated_keys(keys)))
 
 
 @shows(ContactKeys)
@@ -165,7 +165,7 @@ def contact(**keys: Unpack[ContactKeys]) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    block = validate_tree(tree_of({"contact": passed(keys)}, NOWHERE)).contact
+    block = validate_tree(tree_of({"contact": stated_keys(keys)}, NOWHERE)).contact
     assert block is not None, "a block set by an argument is in the config"
     return block
 
@@ -255,8 +255,8 @@ def basin(
     cells      number of cells of the grid of starts, along each of its two axes
     keys       other keys of the block `basin`, such as model, or of the config, such as seed
 
-    Returns a result whose `summary` has the share of starts that walk on, and whose arrays have the outcome of each
-    cell. Raises ConfigError for values that are not allowed.
+    Returns a result whose `summary` has the share of starts that lead to walking, and whose arrays have the outcome of
+    each cell. Raises ConfigError for values that are not allowed.
 
     >>> basin(cells=(6, 4)).dataset("basin").outcome.shape
     (6, 4)
@@ -391,8 +391,8 @@ def check(
     'reproduced'
     """
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
-    known = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
-    block = {**known, **keys, **({} if printed is None else {"printed": dict(printed)})}
+    stated = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
+    block = {**stated, **keys, **({} if printed is None else {"printed": dict(printed)})}
     return run_in_memory("check", add_blocks(start, **({"check": block} if block else {})))
 
 
@@ -446,10 +446,10 @@ def explore(
     >>> page.close()
     """
     from walkerlab.views.explore.server import Server
-    from walkerlab.views.explore.walks import ExploredConfig, sets_of
+    from walkerlab.views.explore.walks import ExploredConfig, set_arguments
 
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
-    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}, called="your walker"))
+    server = Server(0, ExploredConfig(None, set_arguments(config), folder_of(runs), {}, called="your walker"))
     server.begin()
     return server
 
@@ -502,8 +502,8 @@ def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict
     """Take the keys of a stage's block out of `keys`, and return the block with them and `values`, by its name."""
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage with a question has a block"
-    own = {name: keys.pop(name) for name in block.model_fields if name in keys}
-    entries = {name: value for name, value in {**own, **values}.items() if value is not None}
+    block_keys = {name: keys.pop(name) for name in block.model_fields if name in keys}
+    entries = {name: value for name, value in {**block_keys, **values}.items() if value is not None}
     return {stage: entries or None}
 
 

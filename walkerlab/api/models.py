@@ -45,8 +45,8 @@ def export_model(
     slope      what is tilted in MuJoCo: `gravity`, or `geometry` for the ground and the walker on it
     keys       other config keys, such as start, strides, push_off
 
-    Returns all files. Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if
-    no gait is found.
+    Returns the paths of all files. Raises ConfigError for an unknown format or a walker that the format cannot express,
+    NoAnswer if no gait is found.
 
     >>> [path.name for path in export_model(folder / "compass.adm", slope_deg=1)]
     ['compass.adm', 'compass.acf']
@@ -73,8 +73,8 @@ def mujoco_model(
 ) -> "tuple[MjModel, MjData]":
     """Build a walker as a MuJoCo model with data at the start of its gait. Plain `mujoco.mj_step` makes it walk.
 
-    Drives and knees are a control callback, which MuJoCo calls in each step. Callbacks are global: this model walks
-    until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.
+    A control callback, which MuJoCo calls in each step, simulates drives and knees. Callbacks are global: this model
+    walks until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.
 
     config  a Config, a config file or built-in name, a run, or a gait. A gait that was found in memory has no ground,
             so the paper's is used, on pads

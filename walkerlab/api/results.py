@@ -180,8 +180,8 @@ class Result:
         from walkerlab.views.figures.registry import FIGURES
 
         results = {self.stage: cast(Identified, self.content)}
-        own = (figure for figure in FIGURES if figure.stages == (self.stage,))
-        return {figure.name: figure for figure in own if figure.why_left_out(results, {}) is None}
+        figures = (figure for figure in FIGURES if figure.stages == (self.stage,))
+        return {figure.name: figure for figure in figures if figure.why_left_out(results, {}) is None}
 
 
 @dataclass(frozen=True, repr=False)

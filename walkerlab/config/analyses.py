@@ -21,7 +21,7 @@ _Bounds = tuple[_Bound, ...]  # empty for the default window
 class Basin(Block):
     """Grid of starts just after heel strike. Coordinates that the grid does not vary have the gait's values."""
 
-    model: Literal["rigid", "contact"] = key("rigid", "", "which model walks")
+    model: Literal["rigid", "contact"] = key("rigid", "", "model that is simulated")
     plane: tuple[Coordinate, ...] = key(
         ("theta_2", "dtheta_2"),
         "",
@@ -49,8 +49,8 @@ class Basin(Block):
     refine: int = key(
         4, "1", "parts into which cells at basin boundaries are divided along each axis; 1: no refinement", ge=1, le=32
     )
-    steps: int = key(300, "1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
-    contact_steps: int = key(12, "1", "steps that the contact model walks", ge=2, le=10_000)
+    steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
+    contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
 
     @field_validator("plane")
     @classmethod
@@ -219,7 +219,7 @@ class Robustness(Block):
     """Disturbances and parameters of `walkerlab robustness`."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
-        None, "", "which model walks", default_in_words="both, rigid where there is no contact block"
+        None, "", "model that is simulated", default_in_words="both, rigid where there is no contact block"
     )
     to: tuple[str, ...] | None = key(
         None,
@@ -237,7 +237,7 @@ class Robustness(Block):
         bounds="a list of numbers above 0",
     )
     walks: int = key(400, "1", "walks per roughness", ge=2, le=1_000_000)
-    max_steps: int = key(20_000, "1", "steps after which a walk on rough ground is cut off", ge=1, le=10_000_000)
+    max_steps: int = key(20_000, "1", "maximum number of steps of a walk on rough ground", ge=1, le=10_000_000)
 
 
 FATES: Final = tuple(outcome.label for outcome in Outcome)
@@ -255,7 +255,7 @@ class Case(Block):
         ..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=CASE_NAME
     )
     family: str = key("own", "", "group of the case in tables", bounds="same as for name", pattern=CASE_NAME)
-    model: Literal["contact", "rigid"] = key("contact", "", "which model walks")
+    model: Literal["contact", "rigid"] = key("contact", "", "model that is simulated")
     config: dict[str, Any] = key(dict, "", "config keys that replace the paper's", bounds="a block of keys")
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
     lowered_m: float = key(0.0, "m", "depth of the start below the ground; negative: above it", ge=-1e3, le=1e3)

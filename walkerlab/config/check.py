@@ -38,7 +38,7 @@ class PrintedValue:
     text: str
     real: Digits
     imaginary: Digits | None = None
-    bounds: tuple[float, float] | None = None  # of a range, of a value with an uncertainty, or of 'less than'
+    bounds: tuple[float, float] | None = None  # bounds of a range, of a value with an uncertainty, or of 'less than'
     both_signs: bool = False  # whether the imaginary part has both signs
 
     @property
@@ -57,7 +57,7 @@ def digits_of(text: str) -> Digits:
 def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
     """Return how a right value agrees with all printed digits: 'rounded', 'cut off', or '' if it does not.
 
-    error  of the right value
+    error  numerical error of the right value
     """
     if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
         return "rounded"
@@ -120,7 +120,7 @@ _FROM: Any = key("vertical", "", "line from which the first angle is measured")
 if TYPE_CHECKING:
 
     class _From(Block):
-        """Key `from`."""
+        """Declaration of the key `from`."""
 
 else:
     # `from` is a keyword of Python, so a class body cannot declare it

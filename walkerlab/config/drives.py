@@ -9,7 +9,7 @@ from walkerlab.config.second_leg import SecondPushOff
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
-QUICKEST: Final = 1e4  # rad/s, fastest leg on a hip spring or damper; massless legs would be infinitely fast
+MAX_LEG_SPEED: Final = 1e4  # rad/s, to which hip torques may drive a leg; excludes nearly massless legs
 
 
 class Hip(Block):
@@ -22,7 +22,7 @@ class Hip(Block):
     torque_N_m: float = key(
         0.0,
         "N m",
-        "constant torque on the swing leg, its opposite on the stance leg; above 0 it swings the free leg forward",
+        "constant torque on the swing leg, with its reaction on the stance leg; above 0 it swings the free leg forward",
         ge=-STRONGEST,
         le=STRONGEST,
     )
@@ -30,7 +30,7 @@ class Hip(Block):
     def too_quick_for(self, inertia: float) -> bool:
         """Whether the torques would swing a leg with this inertia about the hip (kg m^2) too fast to integrate."""
         steady = max(self.spring_N_m_per_rad, abs(self.torque_N_m))
-        return steady > QUICKEST**2 * inertia or self.damping_N_m_s_per_rad > QUICKEST * inertia
+        return steady > MAX_LEG_SPEED**2 * inertia or self.damping_N_m_s_per_rad > MAX_LEG_SPEED * inertia
 
 
 class PushOff(Block):

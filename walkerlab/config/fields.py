@@ -106,11 +106,11 @@ def leaves(
     """
     for name, field in block.model_fields.items():
         inner = block_of(field)
-        own = getattr(held, name, None)
+        instance = getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
-            yield from leaves(type(own) if isinstance(own, Block) else inner, (*prefix, name), own)
+            yield from leaves(type(instance) if isinstance(instance, Block) else inner, (*prefix, name), instance)
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
@@ -123,6 +123,12 @@ def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...],
 def value_at(config: Any, path: Iterable[str]) -> Any:
     """Return the value at a path of keys, or None if the config lacks a block on the path."""
     return reduce(lambda block, name: getattr(block, name, None), path, config)
+
+
+def replace_key(block: Any, path: str, value: Any) -> Any:
+    """Return a copy of a block with another value at a dotted path. It is not validated."""
+    name, _, tail = path.partition(".")
+    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
 
 
 def annotation_of(field: FieldInfo, name: str) -> str:
@@ -143,7 +149,7 @@ def describe_type(annotation: Any) -> str:
     if origin is Annotated:
         return describe_type(get_args(annotation)[0])
     if origin is Literal:
-        return "word"
+        return _KINDS[int] if isinstance(get_args(annotation)[0], int) else "word"
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
@@ -154,10 +160,10 @@ def describe_type(annotation: Any) -> str:
 
 
 def words_of(annotation: Any) -> tuple[str, ...]:
-    """Return the words that a type allows, including those inside a list or union."""
+    """Return the words and numbers that a type lists, including those inside a list or union, as text."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
-        return tuple(word for word in parts if isinstance(word, str))
+        return tuple(map(str, parts))
     return tuple(chain.from_iterable(map(words_of, parts)))
 
 
@@ -167,8 +173,11 @@ def bounds_of(field: FieldInfo) -> str:
     what = describe_type(field.annotation)
     if description:
         return description
-    if what in ("word", _KINDS[bool]):
-        return ", ".join(words_of(field.annotation)) or what
+    if what == _KINDS[bool]:
+        return what
+    words = words_of(field.annotation)
+    if words and what in ("word", _KINDS[int]):
+        return ", ".join(words)
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
         return f"from {short_number(limits['ge'])} to {short_number(limits['le'])}"
@@ -183,7 +192,7 @@ def describe_allowed(field: FieldInfo) -> str:
     bounds = bounds_of(field)
     unit = annotation_of(field, "unit")
     what = describe_type(field.annotation)
-    if what == "word":
+    if what == "word" or bounds == ", ".join(words_of(field.annotation)) != "":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what

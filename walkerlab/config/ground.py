@@ -15,7 +15,7 @@ class Footholds(Block):
     heights_m: tuple[float, ...] = key(
         (),
         "m",
-        "heights of footholds 1, 2, … over the slope, along its normal; later footholds have the last height",
+        "heights of footholds 1, 2, … above the slope, along its normal; later footholds have the last height",
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 

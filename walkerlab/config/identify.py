@@ -33,6 +33,12 @@ class Identify(Recorded):
         "parameters that were measured by other means, in the key's unit",
         bounds="[value, standard deviation] for each key, the second above 0",
     )
+    first_leg: Literal[1, 2] | None = key(
+        None,
+        "",
+        "leg that swings in the first step of a table of steps, if the legs differ",
+        default_in_words="both are tried",
+    )
     nuisance: tuple[Nuisance, ...] = key(
         (),
         "",
@@ -46,7 +52,7 @@ class Identify(Recorded):
     max_walks: int = key(
         10_000,
         "1",
-        "number of predicted walks after which a fit ends without convergence",
+        "maximum number of predicted walks before a fit ends without convergence",
         ge=1,
         le=10_000_000,
     )
@@ -70,7 +76,7 @@ class Identify(Recorded):
     def sensors(self) -> tuple[Nuisance, ...]:
         """Properties of clock and sensors to estimate.
 
-        A camera's free tilt is an offset of all angles. So is the floor's normal, while the slope is estimated.
+        A free tilt of the camera is an offset of all angles, and so is the floor's normal if the slope is estimated.
         """
         follows = self.camera_tilt_deg == "floor" and self.level == "angles" and "slope_deg" in self.keys
         return tuple(dict.fromkeys((*self.nuisance, *((OFFSET,) if follows or self.camera_tilt_deg == "free" else ()))))

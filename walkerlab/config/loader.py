@@ -44,7 +44,7 @@ IMPLAUSIBLE_LENGTH_M: Final = 20.0
 IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
 """Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
 WATER_KG_M3: Final = 1000.0
-"""Density of water; a mass larger than a water cube as wide as the legs are long is perhaps in grams."""
+"""Density of water; a mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def load(
     changed = validate_tree(changed_tree)
     base = validate_tree(tree) if settings else changed
     check_cases(changed, changed_tree)
-    config, moved = align_start(changed, changed_tree)
+    config, adjustments = align_start(changed, changed_tree)
     slope = changed_tree.entries.get("slope_deg")
     degrees = float(slope.value) if isinstance(slope, Scalar) and isinstance(slope.value, int | float) else None
     new = changes_of(base, changed, degrees)
@@ -121,7 +121,7 @@ def load(
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
     named = tree.entries["name"]
-    warnings = [*suspicious_values(config, changed_tree), *moved]
+    warnings = [*suspicious_values(config, changed_tree), *adjustments]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
         cannot = "since the file's name is not valid for a run folder"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
@@ -134,7 +134,9 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: leg mass not moved with the leg, wrong units, pad pitch without pads."""
+    """Yield warnings about likely mistakes: a leg mass that did not move with its leg, wrong units, a pitch without
+    pads.
+    """
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
@@ -143,8 +145,10 @@ def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
         leg = places["leg_length_m"]
         mass = places["foot_to_mass_m"].source
         stays = walker.foot_to_mass_m
-        moved = leg.source.startswith("built-in") or mass.startswith("--")  # the user changed the mass, not the leg
-        if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
+        mass_was_changed = leg.source.startswith("built-in") or mass.startswith(
+            "--"
+        )  # the user changed the mass, not the leg
+        if leg.source != mass and not mass_was_changed and stays != walker.leg_length_m / 2:
             yield (
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m is still {short_number(stays)} m "
                 f"(from {mass}), so the mass is not in the middle of the leg"
@@ -194,7 +198,7 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
     differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
-    # Null says nothing new about a key of a block that was null.
+    # If a block was null, a null key in it is no change.
     absent = {f"{key}." for key, value in values_before.items() if value is None}
     differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:

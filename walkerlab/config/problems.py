@@ -54,7 +54,7 @@ def problem_error(
 
 def explain_missing_feature(word: str) -> str:
     """Explain in a sentence why walkerlab lacks the feature that `word` names, or return '' if no pattern matches."""
-    return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
+    return next((reason for pattern, reason in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 
 def nearest(word: str, candidates: Iterable[str]) -> str:

@@ -278,7 +278,7 @@ def slice_of(config: schema.Config, takes: type | None) -> dict[str, Any]:
 def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield dotted names and values of nested objects. `lists` also splits lists into items, named by their index."""
     for name, value in block.items():
-        inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
+        inner = {str(index): item for index, item in enumerate(value)} if lists and isinstance(value, list) else value
         if isinstance(inner, Mapping):
             yield from flatten(inner, lists, f"{prefix}{name}.")
         else:

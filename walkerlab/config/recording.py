@@ -36,8 +36,8 @@ class Recorded(Block):
     camera_tilt_deg: Tilt | None = key(
         None,
         "deg",
-        "angle by which the direction that the angles are measured from leans off the vertical, its top forwards; "
-        "floor: as the floor's normal does, free: to be found in the recording",
+        "forward lean from the vertical of the direction from which angles are measured; "
+        "floor: that of the floor's normal, free: found from the recording",
         bounds="-45 to 45, floor, free",
         default_in_words="0, or floor if the file's program levels the floor",
     )
@@ -70,7 +70,7 @@ class Recorded(Block):
     min_likelihood: float | None = key(
         None,
         "1",
-        "likelihood of a marker below which its place is a gap",
+        "likelihood of a marker below which its position counts as missing",
         ge=0.0,
         le=1.0,
         default_in_words="none",

@@ -108,9 +108,9 @@ def select_keys(selection: str) -> list[KeyReference]:
     ]
     if not matches:
         names = dict.fromkeys(".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3))
-        alike = " or ".join([name for name in names if selection in name.split(".")[-1]][:SHOWN_KEYS])
+        similar = " or ".join([name for name in names if selection in name.split(".")[-1]][:SHOWN_KEYS])
         by_end = {name.split(".")[-1]: name for name in reversed(names)}
-        near = alike or nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
+        near = similar or nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {selection}.{meant}", "`walkerlab schema` lists every key")
     everywhere = {key for key in matches if key.key == plain[key]}

@@ -18,10 +18,10 @@ from walkerlab.config.recording import RecordedFile
 from walkerlab.config.walkers import (
     CompassWalker,
     Walker,
+    explain_wrong_state,
     is_passive_compass,
     why_no_contact,
     why_no_push_off,
-    why_no_state,
 )
 from walkerlab.extensions import words
 
@@ -93,7 +93,7 @@ def replace_state(start: Any, state: tuple[float, ...]) -> Any:
 
 
 def kind_of_start(value: Any) -> str:
-    """Return the tag of the kind of start that a value is."""
+    """Return the union tag of a `start` value: its kind of state, or word."""
     if isinstance(value, list | tuple):
         return "state" if len(value) <= 4 else "long"
     return MID_STEP if isinstance(value, dict | MidStep) else "word"
@@ -273,7 +273,7 @@ class Config(Block):
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of all random numbers", ge=0, le=2**32 - 1)
 
-    _fits = check_against("start", "walker", why_no_state)
+    _fits = check_against("start", "walker", explain_wrong_state)
     _pushes = check_against(
         "push_off", "walker", lambda value, walker: why_no_push_off(walker) if any(push_offs(value)) else ""
     )

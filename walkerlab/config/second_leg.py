@@ -7,7 +7,7 @@ from walkerlab.config.fields import Block, key
 
 def second_leg(unit: str, least: float | None = None) -> Any:
     limits: dict[str, Any] = {} if least is None else {"ge": least}
-    return key(None, unit, "the same of leg 2", bounds="as for leg 1", default_in_words="as for leg 1", **limits)
+    return key(None, unit, "the same for leg 2", bounds="as for leg 1", default_in_words="as for leg 1", **limits)
 
 
 class SecondCompassLeg(Block):
@@ -69,7 +69,7 @@ class SecondKneedLeg(Block):
 
 
 class KneelessLeg(SecondStraightLeg):
-    """A second leg without a knee. Keys that it leaves out are those of leg 1 with its knee locked."""
+    """A second leg without a knee. Keys left out have the values of leg 1 with its knee locked."""
 
     type: Literal["straight-legs"] = key(..., "", "a leg without a knee")
 
@@ -78,6 +78,11 @@ class SecondPushOff(Block):
     """The push-off of leg 2, if it differs from that of leg 1."""
 
     impulse_N_s: float | None = second_leg("N s", 0.0)
+
+
+def states_second_leg(config: Any) -> bool:
+    """Whether a config states a second leg or its push-off, or has a type of walker without `leg_2`."""
+    return getattr(config.walker, "leg_2", ...) is not None or config.push_off.leg_2 is not None
 
 
 def describe_second_leg(walker: Any) -> str:

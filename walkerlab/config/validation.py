@@ -23,8 +23,8 @@ from walkerlab.config.problems import (
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
-from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_of
-from walkerlab.extensions import WORDS, foreign
+from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_leg_of
+from walkerlab.extensions import WORDS, external_extensions
 
 Location: TypeAlias = tuple[int | str, ...]
 
@@ -55,7 +55,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-FAR_OFF: Final = 0.01  # rad or rad/s; a stated value of a start that is off by more is refused
+FAR_OFF: Final = 0.01  # rad or rad/s; a start is rejected if one of its stated values is off by more than this
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
@@ -109,7 +109,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
     stated: Sequence[float | None] = config.start.state if isinstance(config.start, MidStep) else config.start
     where = tree.entries["start"].position
     start = list(stated)
-    moved = list[str]()
+    adjustments = list[str]()
     following = following_values(config, stated)
     for place, value in enumerate(stated):
         if value is None and place not in following:
@@ -125,13 +125,13 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
             midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
             raise problem_error(where, change.format("is", "but must be"), advice=advice)
-        moved.append(str(Problem(where, change.format("moved from", "to"))))
+        adjustments.append(str(Problem(where, change.format("moved from", "to"))))
     if not isinstance(config.start, MidStep):
-        return config.model_copy(update={"start": tuple(start)}), tuple(moved)
+        return config.model_copy(update={"start": tuple(start)}), tuple(adjustments)
     if isinstance(config.walker, Kneed) and config.start.state[2] > config.start.state[0] + MOVED_RAD:
         raise problem_error(where, "start: theta_1_shank is above theta_1, but knees do not bend beyond straight")
     midway_start = config.start.model_copy(update={"state": tuple(start)})
-    return config.model_copy(update={"start": midway_start}), tuple(moved)
+    return config.model_copy(update={"start": midway_start}), tuple(adjustments)
 
 
 def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
@@ -148,7 +148,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     if not isinstance(config.start, MidStep) and not isinstance(walker, AssembledWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
-        if second_of(walker) is not walker:
+        if second_leg_of(walker) is not walker:
             swing = walker.swing_angle(values[1] + config.slope_rad)
             values[0] = values[0] if swing is None else swing - config.slope_rad
         following[0] = FollowingValue("theta_1", values[0], "rad", because)
@@ -231,10 +231,10 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
     value = format_node(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
-        given, where = node_at(tree, ("contact", judge))
-        if given is not None and node is None:
+        bound, where = node_at(tree, ("contact", judge))
+        if bound is not None and node is None:
             position = where
-        elif given is not None and where.source != position.source and _is_later(where, position):
+        elif bound is not None and where.source != position.source and _is_later(where, position):
             text = f"contact.{judge}: {key} is still {value} (from {position.source}) and {reason}"
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
@@ -249,7 +249,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
 
 def advise_extensions() -> str:
     """Return the advice for a word that an extension may add."""
-    names = ", ".join(found.name for found in foreign() if found.extension) or "none"
+    names = ", ".join(found.name for found in external_extensions() if found.extension) or "none"
     return f", or a word of an extension: install the one that adds it (installed: {names})"
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeGuard
 from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import QUICKEST, Hip, acting_on
+from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.numbers import short_number
 from walkerlab.config.second_leg import (
@@ -111,25 +111,25 @@ class _Legged(Block):
 
         Angles are from the ground's normal. Returns None if leg 1 cannot reach the ground.
         """
-        second = second_of(self)
+        second = second_leg_of(self)
         if second is self:
             return float(-2 * self.lean_rad - stance_rad)
         (own, own_radius), (other, radius) = (
             (math.hypot(leg.leg_length_m - sole, getattr(leg, "foot_centre_ahead_m", 0.0)), sole)
             for leg, sole in ((each, 0.0 if each.type == "compass" else each.foot_radius_m) for each in (self, second))
         )
-        height = radius + other * math.cos(stance_rad + lean_of(second)) - own_radius
-        return None if abs(height) > own else -math.acos(height / own) - lean_of(self)
+        height = radius + other * math.cos(stance_rad + rigid_lean(second)) - own_radius
+        return None if abs(height) > own else -math.acos(height / own) - rigid_lean(self)
 
     @property
     def foot_radii_m(self: Any) -> tuple[float, float]:
         """Radius (m) of each leg's foot."""
-        return self.foot_radius_m, second_of(self).foot_radius_m
+        return self.foot_radius_m, second_leg_of(self).foot_radius_m
 
     @property
     def total_mass_kg(self: Any) -> float:
         """Mass of the whole walker, kg."""
-        legs = self.leg_mass_kg + second_of(self).leg_mass_kg
+        legs = self.leg_mass_kg + second_leg_of(self).leg_mass_kg
         return float(legs + self.hip_mass_kg + torso_mass(self.torso))
 
     @field_validator("hip", check_fields=False)
@@ -146,10 +146,10 @@ class _Legged(Block):
         with suppress(AttributeError):  # errors of the keys above are reported already
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
-                most = f"{QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
+                most = f"{MAX_LEG_SPEED**2 * inertia:.3g} (torque, spring) and {MAX_LEG_SPEED * inertia:.3g} (damper)"
                 raise meaning_error(
-                    f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
-                    f"hip, {inertia:.3g} kg m^2, the limits are {most}"
+                    f"whose torques would swing the legs faster than {MAX_LEG_SPEED:g} rad/s: with their inertia about "
+                    f"the hip, {inertia:.3g} kg m^2, the limits are {most}"
                 )
         return value
 
@@ -183,7 +183,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
     return kind.model_validate(second)
 
 
-def second_of(walker: Any) -> Any:
+def second_leg_of(walker: Any) -> Any:
     """Return the walker with two legs like leg 2, or the walker itself if it has no `leg_2`."""
     return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
 
@@ -197,11 +197,11 @@ class CompassWalker(_Legged):
     """Two straight legs, each with a mass on it, and a mass at the hip."""
 
     type: Literal["compass"] = key("compass", "", "kind of walker", "Fig. 1")
-    leg_length_m: float = length(1.0, "L, from foot to hip", "Table 1")
+    leg_length_m: float = length(1.0, "leg length L, from foot to hip", "Table 1")
     foot_to_mass_m: float = key(
         lambda data: data.get("leg_length_m", 1.0) / 2,
         "m",
-        "a, from foot to leg mass; b = L - a is the rest",
+        "distance a from foot to leg mass; from there to the hip it is b = L - a",
         "section 2: 'in the middle of the legs'",
         bounds="from 0 to below leg_length_m",
         default_in_words="leg_length_m / 2",
@@ -213,7 +213,7 @@ class CompassWalker(_Legged):
     foot_radius_m: float = key(
         lambda data: min(0.001, data.get("leg_length_m", 1.0) / 10),
         "m",
-        "radius of the ball foot of the contact model, 0 is a point; its centre is L - r from the hip",
+        "radius of the ball feet of the contact model, 0 for points; their centres are L - r from the hip",
         "section 4: 'beveled with a radius of 1 mm'",
         bounds="from 0 to below leg_length_m / 2",
         default_in_words="0.001, at most leg_length_m / 10",
@@ -238,16 +238,18 @@ class StraightLegs(_Legged):
     """Two straight legs of any mass distribution, whose arc feet roll in both models."""
 
     type: Literal["straight-legs"] = key("straight-legs", "", "kind of walker", WISSE)
-    leg_length_m: float = length(0.4, "hip to sole, foot included", WISSE)
+    leg_length_m: float = length(0.4, "length from hip to sole, foot included", WISSE)
     leg_mass_kg: float = mass(1.0, "mass of one leg", WISSE)
-    leg_mass_below_hip_m: float = offset(0.1, "a leg's centre of mass below the hip", WISSE)
-    leg_mass_ahead_m: float = offset(0.0, "a leg's centre of mass ahead of its line, leg upright", WISSE)
+    leg_mass_below_hip_m: float = offset(0.1, "distance of a leg's centre of mass below the hip", WISSE)
+    leg_mass_ahead_m: float = offset(
+        0.0, "distance of a leg's centre of mass ahead of the leg's line, for an upright leg", WISSE
+    )
     leg_inertia_kg_m2: float = inertia(0.01, "one leg")
     hip_mass_kg: float = mass(0.0, "mass at the hip", WISSE, 0.0)
     foot_radius_m: float = key(
-        0.1, "m", "radius of the sole's arc, 0 is a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0
+        0.1, "m", "radius of the sole's arc, 0 for a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0
     )
-    foot_centre_ahead_m: float = offset(0.0, "the arc's centre ahead of the leg's line", WISSE)
+    foot_centre_ahead_m: float = offset(0.0, "distance of the arc's centre ahead of the leg's line", WISSE)
     torso: Torso | None = None
     hip: Hip = Hip()
     leg_2: SecondStraightLeg | None = None
@@ -262,20 +264,20 @@ class StraightLegs(_Legged):
 class Thigh(Block):
     """The upper half of a leg with a knee."""
 
-    length_m: float = length(0.5, "hip to knee", HSU_CHEN)
+    length_m: float = length(0.5, "length from hip to knee", HSU_CHEN)
     mass_kg: float = mass(0.5, "mass of one thigh", HSU_CHEN)
-    mass_below_hip_m: float = offset(0.325, "its centre of mass below the hip", HSU_CHEN)
-    mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
+    mass_below_hip_m: float = offset(0.325, "distance of its centre of mass below the hip", HSU_CHEN)
+    mass_ahead_m: float = offset(0.0, "distance of its centre of mass ahead of the line from hip to knee", HSU_CHEN)
     inertia_kg_m2: float = inertia(0.0, "one thigh")
 
 
 class Shank(Block):
     """The lower half of a leg with a knee, foot included."""
 
-    length_m: float = length(0.5, "knee to sole", HSU_CHEN)
+    length_m: float = length(0.5, "length from knee to sole", HSU_CHEN)
     mass_kg: float = mass(0.05, "mass of one shank", HSU_CHEN)
-    mass_below_knee_m: float = offset(0.125, "its centre of mass below the knee", HSU_CHEN)
-    mass_ahead_m: float = offset(0.0, "its centre of mass ahead", HSU_CHEN)
+    mass_below_knee_m: float = offset(0.125, "distance of its centre of mass below the knee", HSU_CHEN)
+    mass_ahead_m: float = offset(0.0, "distance of its centre of mass ahead of the line from knee to foot", HSU_CHEN)
     inertia_kg_m2: float = inertia(0.0, "one shank")
 
     _inertia = check_inertia(
@@ -318,13 +320,13 @@ class Kneed(_Legged):
     foot_radius_m: float = key(
         0.0,
         "m",
-        "radius of the sole's arc, 0 is a point",
+        "radius of the sole's arc, 0 for a point",
         HSU_CHEN,
         bounds="from 0 to less than the length from hip to sole",
         ge=0.0,
     )
     foot_centre_ahead_m: float = offset(
-        0.0, "the arc's centre, or the point, ahead of the shank's line, perpendicular to it", MCGEER
+        0.0, "distance of the arc's centre, or of the point, ahead of the shank's line", MCGEER
     )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
@@ -443,9 +445,11 @@ class PartsWalker(AssembledWalker):
     feet: tuple[PartFoot, PartFoot] = parts(PartFoot, "a foot for each leg", number="two of ")
     couplings: tuple[PartCoupling, ...] = parts(PartCoupling, "bodies that follow others", ())
     legs: tuple[LegBodies, LegBodies] = key(
-        ..., "", "bodies of each leg, hip down", bounds="two lists of names", sequence=True
+        ..., "", "bodies of each leg, from the hip down", bounds="two lists of names", sequence=True
     )
-    leg_length_m: float = length(..., "hip to sole, must agree with the parts; scale for lengths and falls")
+    leg_length_m: float = length(
+        ..., "length from hip to sole, which must agree with the parts; scale for lengths and falls"
+    )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
     hip: Hip = Hip()
@@ -465,7 +469,7 @@ class PartsWalker(AssembledWalker):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the first leg's sole below the hip, legs upright, or None if hinges do not
+    """Return the depth (m) of the first leg's sole below the hip for upright legs, or None if hinges do not
     connect them.
     """
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
@@ -491,8 +495,8 @@ def why_off_the_leg(mass_m: float, length_m: float) -> str:
     return f"{massless if mass_m == length_m else ''}must be below leg_length_m, {length_m:g}"
 
 
-def lean_of(walker: Any) -> float:
-    """Return `lean_rad` as in the rigid model, in which a compass has point feet."""
+def rigid_lean(walker: Any) -> float:
+    """Return the `lean_rad` of the rigid model, which is 0 for a compass because its feet are points."""
     return 0.0 if walker.type == "compass" else float(walker.lean_rad)
 
 
@@ -544,15 +548,15 @@ def leg_inertia(walker: Any) -> float:
         squared = (upper.length_m + lower.mass_below_knee_m) ** 2 + lower.mass_ahead_m**2
         thigh = upper.mass_kg * (upper.mass_below_hip_m**2 + upper.mass_ahead_m**2) + upper.inertia_kg_m2
         return float(thigh + lower.mass_kg * squared + lower.inertia_kg_m2)
-    own = [body for body in walker.bodies if body.name in walker.legs[0]]
+    bodies = [body for body in walker.bodies if body.name in walker.legs[0]]
     on_them = [particle.mass_kg for particle in walker.particles if particle.body in walker.legs[0]]
-    mass = sum(on_them) + sum(body.mass_kg for body in own)
-    return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in own))
+    mass = sum(on_them) + sum(body.mass_kg for body in bodies)
+    return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in bodies))
 
 
 def why_no_push_off(walker: Any) -> str:
     """Explain why a walker cannot push off along its trailing leg, or return '' if it can."""
-    return why_no_push_on(walker) or why_no_push_on(second_of(walker))
+    return why_no_push_on(walker) or why_no_push_on(second_leg_of(walker))
 
 
 def why_no_push_on(walker: Any) -> str:
@@ -575,7 +579,7 @@ def why_no_push_on(walker: Any) -> str:
 def too_light_for_contact(walker: Any) -> str:
     """Explain why a walker cannot stand on compliant ground, or return '' if it can."""
     lighter = (
-        min(each.leg_mass_kg for each in (walker, second_of(walker))) if isinstance(walker, CompassWalker) else 1.0
+        min(each.leg_mass_kg for each in (walker, second_leg_of(walker))) if isinstance(walker, CompassWalker) else 1.0
     )
     share = lighter / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
@@ -588,11 +592,13 @@ def too_light_for_contact(walker: Any) -> str:
 
 def why_no_contact(walker: Any) -> str:
     """Explain why a walker cannot have a contact block, with advice, or return '' if it can."""
-    why = too_light_for_contact(walker)
-    return f"cannot carry this walker, as {why}; leave the contact block out, or give the legs mass" if why else ""
+    reason = too_light_for_contact(walker)
+    return (
+        f"cannot carry this walker, as {reason}; leave the contact block out, or give the legs mass" if reason else ""
+    )
 
 
-def why_no_state(start: Any, walker: Any) -> str:
+def explain_wrong_state(start: Any, walker: Any) -> str:
     """Explain why a start has the wrong number of values for a walker, or return '' if the number is right."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
@@ -621,9 +627,9 @@ def why_rigid_alone(walker: Any) -> str:
 
 def contact_required_error(request: str, walker: Any, instead: str) -> ConfigError:
     """Build the error for a request that needs contact. `instead` is the advice if only the block is missing."""
-    why = too_light_for_contact(walker)
-    if why:
-        return ConfigError(f"{request} needs contact, but {why}.", "Use the rigid model, or give the legs mass.")
+    reason = too_light_for_contact(walker)
+    if reason:
+        return ConfigError(f"{request} needs contact, but {reason}.", "Use the rigid model, or give the legs mass.")
     return ConfigError(f"{request} needs a contact block, but the config has none.", instead)
 
 
@@ -631,14 +637,14 @@ def load_walkers() -> dict[str, type[Block]]:
     """Import the types of walkers that extensions add, by word. Those that cannot be imported are left out, with a
     warning.
     """
-    found = {}
+    types = {}
     for word, code in declared("walkers").items():
         try:
-            found[word] = load(code)
+            types[word] = load(code)
         except Exception as error:
-            why = f"{type(error).__name__}: {error}"
-            warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {why}", stacklevel=2)
-    return found
+            reason = f"{type(error).__name__}: {error}"
+            warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {reason}", stacklevel=2)
+    return types
 
 
 if TYPE_CHECKING:

@@ -53,7 +53,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
-    """Write a config as YAML with meaning, bounds and unit above each key, without the top-level keys `left_alone`."""
+    """Write a config as YAML with meaning, bounds and unit above each key. It leaves out the keys `left_alone`."""
     kept = [name for name in type(config).model_fields if name not in left_alone]
     return commented_keys(config, kept) + "".join(f"# {name}: {ELSEWHERE.format(name)}\n" for name in left_alone)
 

@@ -28,8 +28,8 @@ def statements(model: AdamsModel) -> Iterator[str]:
         for marker_name, marker in model.markers.items():
             if marker.part == name:
                 place = "FLOATING" if marker.floating else f"QP = {values(*marker.place)}"
-                own = marker_name.rpartition(".")[2]
-                yield from named_statement(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
+                short_name = marker_name.rpartition(".")[2]
+                yield from named_statement(short_name, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
         head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
         yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
@@ -55,6 +55,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, function in model.variables.items():
         yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
+        # Of several functions in a statement, all but the last end in a backslash.
         yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
@@ -97,6 +98,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
+    # Only the moment about the plane's normal matters to the walk. Three equal moments are those of a possible body.
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 

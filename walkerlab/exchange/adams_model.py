@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from walkerlab.physics.ground.friction import Coulomb, Frictionless
 from walkerlab.physics.ground.knees import MIN_FLEXION
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
@@ -35,15 +36,13 @@ PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
 FRICTION_NAMES = ("mu_static", "mu_dynamic", "stiction_transition_velocity", "friction_transition_velocity")
-"""ADAMS's names for the parameters of `Coulomb`, in its order."""
+"""ADAMS's names for the fields of `Coulomb`, in the same order."""
 REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
 """Time between the outputs of a simulation."""
 TIME_FACTOR = 1.05
 """Maximum simulated time between events, as a multiple of the duration of walkerlab's walk."""
-SHORTEST_HIP = 0.5
-"""Height of the hip, as a fraction of the leg, below which a walker has fallen."""
 ERROR_RAD = 1e-6
 ERROR_MM = 1e-6
 """Tolerances of sensors. ADAMS's default is 1e-3 in the unit of the expression."""
@@ -83,7 +82,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Shape:
-    """Ellipsoid centred on a marker, or box with a corner there. `size` holds its diameters or edge lengths (mm)."""
+    """Ellipsoid around a marker, or box with a corner at it. `size` holds its diameters or edge lengths (mm)."""
 
     kind: str
     marker: str
@@ -162,7 +161,7 @@ class AdamsModel:
 
     @cached_property
     def numbers(self) -> dict[str, int]:
-        """Number of each object within its kind, from 1."""
+        """Number of each object among those of its kind, counted from 1."""
         primitives = [name for name, joint in self.joints.items() if joint.kind == "INLINE"]
         # ADAMS numbers primitives separately from joints.
         joints = [name for name in self.joints if name not in primitives]
@@ -238,7 +237,7 @@ class MovingFrame(NamedTuple):
     spin: float
 
     def moved_to(self, point: Position) -> MovingFrame:
-        """Return the parallel frame at a point of this one."""
+        """Return the parallel frame with its origin at a point of this frame."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
         velocity = self.velocity[0] - self.spin * y, self.velocity[1] + self.spin * x
@@ -280,7 +279,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         weights = {f"hinge_of_{names[link]}": weight for link, weight in coupling.items()}
         model.couplers[f"coupler_{number + 1}"] = weights
     for foot, ball in enumerate(planar.balls):
-        # parts turn only about the normal of the plane, so a ball stays at its distance from the plane, in its lane
+        # Parts turn only about the normal of the plane, so each ball keeps its distance from the plane and its lane.
         name = names[ball.link]
         model.markers[f"{name}.foot"] = marker_at(name, ball.centre_m)
         model.markers[f"{name}.ball"] = marker_at(name, ball.centre_m, export.lane_across_m(foot))
@@ -292,6 +291,8 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         part, (x, y, _) = model.parts[foot_on_ground.part], model.markers[foot_on_ground.marker].place
         place = MovingFrame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
         model.markers[f"{GROUND}.pin"] = Marker(GROUND, (*place, 0.0))
+        # Together with the planar joint of the base, a hinge would hold the foot in the plane twice. INLINE only fixes
+        # the point.
         model.joints["pin"] = Joint("INLINE", foot_on_ground.marker, f"{GROUND}.pin")
 
 
@@ -335,7 +336,7 @@ class FootTerms:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
     def restrict_to_pads(self, expression: str, elsewhere: str = "0") -> str:
-        """Restrict an expression to the pads of the foot's lane. Over the gaps between them it is `elsewhere`."""
+        """Restrict an expression to the pads of the foot's lane. Between the pads its value is `elsewhere`."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
@@ -343,6 +344,7 @@ class FootTerms:
         lane = round(terrain.lanes[self.foot] / terrain.pitch)
         shift = MM * self.export.lane_shift_m(self.foot)
         along = f"(DX({self.place()}){-shift:+.17g})" if shift else f"DX({self.place()})"
+        # The cosine is positive on the pads, which are one pitch long and two pitches apart.
         wave = f"{'-' if lane % 2 else ''}COS(PI*{along}/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
@@ -361,7 +363,7 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
 
 
 def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
-    """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s.
+    """Return the normal-force law and Coulomb friction in N, mm and s. Friction is None if there is none.
 
     Raises ConfigError for other laws.
     """
@@ -429,6 +431,7 @@ def friction_function(leg: str, law: Coulomb) -> str:
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
+    # Beyond v the rise stays at mu or -mu, and the second STEP adds the fall to the dynamic coefficient.
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 
@@ -440,7 +443,7 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
         return
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
-        # leg_1 touches down first, so leg_2 is the first to trail
+        # Leg 1 touches down first, so leg 2 is the first trailing leg.
         pulses = [f"{leg}_pulse_{pulse + 1}" for pulse in range(len(export.touches_s[1 - number :: 2]))]
         for pulse, time in zip(pulses, export.touches_s[1 - number :: 2], strict=True):
             begin = finite(time)
@@ -473,6 +476,8 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
         reaction = f"{GROUND}.reaction_{number + 1}"
         model.markers[reaction] = Marker(GROUND, floating=True)
         along = "+".join(x)
+        # The forces act at the ball's lowest point, so friction has the radius as its arm about the marker at the
+        # centre.
         torque = f"{finite(foot.radius)}*({along})" if foot.radius else "0"
         model.forces[f"force_{number + 1}"] = Force(foot.marker, reaction, along, "+".join(y), torque)
 
@@ -488,6 +493,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.damping_N_m_s_per_rad:
         terms.append(f"-{finite(MM * hip.damping_N_m_s_per_rad)}*WZ({{{i}}},{{{j}}},{{{j}}})")
     if hip.torque_N_m:
+        # Each factor changes its sign at its touchdown.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
         for number, group in enumerate(groups):
@@ -506,11 +512,24 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     """
     law = knee_rules(export.config.walker).stop
     assert isinstance(law, Impact), "the export has a compliant stop"
+    # IMPACT acts where its argument is below the free length. With a free length of 1 rad and the argument 1 - angle,
+    # that is where the knee is beyond straight.
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
-        shank = export.names[export.knee_links[number]]
         foot = FootTerms(export, number)
         other = LEGS[1 - number]
+        place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
+        # Over a gap the sensor must not reach zero.
+        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
+        down_ahead = Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM)
+        sinking = f"VY({foot.motion})"
+        if f"{other}_pulses" in model.variables:
+            # the trailing knee stays locked during the push-off
+            sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
+        model.sensors |= {f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM), f"{leg}_touches": down_ahead}
+        if number >= len(export.knee_links):
+            continue
+        shank = export.names[export.knee_links[number]]
         i, j = f"{shank}.hinge", model.joints[f"hinge_of_{shank}"].j
         angle = f"AZ({{{i}}},{{{j}}})"
         rate = f"WZ({{{i}}},{{{j}}},{{{j}}})"
@@ -518,23 +537,21 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
         if damping := knee_dampings(export.config.walker)[number]:
             model.torques[f"knee_damper_{number + 1}"] = Torque(i, j, f"-{finite(MM * damping)}*{rate}")
-        place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
-        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
-        sinking = f"VY({foot.motion})"
-        if f"{other}_pulses" in model.variables:
-            # the trailing knee stays locked during the push-off
-            sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
         model.sensors |= {
             f"{leg}_bent": Sensor(f"-{finite(MIN_FLEXION)}-{angle}", ERROR_RAD),
             f"{leg}_straight": Sensor(f"IF({angle}:-1,-1,-{rate})", ERROR_RAD),
             f"{leg}_touches": Sensor(down, ERROR_MM),
-            f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM),
-            f"{leg}_on_bent_knee": Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM, halts=True),
+            f"{leg}_on_bent_knee": replace(down_ahead, halts=True),
         }
     hip = f"{{{export.names[0]}.hinge}}"
-    lowest = SHORTEST_HIP * MM * export.config.walker.leg_length_m
+    lowest = FALLEN_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
-    model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))
+    # Leg 1 swings first, so of the locks only that of leg 2 is active at the start.
+    model.inactive = (
+        *(stop for stop in ("stop_1", "stop_2") if stop in model.torques),
+        "lock_1",
+        *(name for name in model.sensors if name != "fell"),
+    )
     for step in range(export.walk.steps):
         model.events += step_events(export, step % 2)
 
@@ -545,8 +562,12 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
     number = swing + 1
     trailing = 2 - swing
     on_bent_knee = f"{leg}_on_bent_knee"
-    yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
-    yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
+    if number <= len(export.knee_links):
+        yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
+        yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
+    if trailing > len(export.knee_links):
+        yield Event(f"{leg}_touches")
+        return
     released = (f"lock_{trailing}",)
     if knee_rules(export.config.walker).release_at_touch and not any(export.impulses_N_s):
         yield Event(f"{leg}_touches", (), released)
@@ -557,6 +578,7 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
 
 def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
     """Add requests named after the quantities of a walk. Angles are from the vertical, lengths in mm."""
+    # ADAMS measures angles from the slope's normal.
     tilt = f"{-export.scene.ours.slope:+.17g}" if export.scene.ours.slope else ""
     uppers = export.names[export.hip_link], export.names[0]
     for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):

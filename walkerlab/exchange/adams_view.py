@@ -22,7 +22,7 @@ def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     commands = ", ".join(map(quote, model.commands(end_s, pinned_until_s)))
     script = command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)
-    lines += [line for each in (*building(model), script) for line in each]
+    lines += [line for each in (*build_commands(model), script) for line in each]
     return "\n".join([*lines, ""])
 
 
@@ -36,7 +36,7 @@ def quote(text: str) -> str:
     return f'"{text}"'
 
 
-def building(model: AdamsModel) -> Iterator[list[str]]:
+def build_commands(model: AdamsModel) -> Iterator[list[str]]:
     root = f".{model.name}"
 
     def full(name: str) -> str:
@@ -119,6 +119,7 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
                 "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
                 location=values(*part.place, 0.0), orientation=format_rotation(part.angle),
             )  # fmt: skip
+        # Locations of markers are relative to the part that carries them.
         yield command("defaults coordinate_system", default_coordinate_system=full(name))
         for marker_name, marker in model.markers.items():
             if marker.part == name and marker.floating:
@@ -137,19 +138,19 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             motion = {"vx": vx, "vy": vy, "vz": "0", "wx": "0", "wy": "0", "wz": f"({finite(part.spin)}(rad/sec))"}
             yield command("part create rigid_body initial_velocity", part_name=full(name), **motion)
     for name, shape in model.shapes.items():
-        own = full(model.shape_name(name))
+        shape_path = full(model.shape_name(name))
         sizes = [finite(edge) for edge in shape.size]
         if shape.kind == "BOX":
             corner = {"corner_marker": full(shape.marker), "diag_corner_coords": ", ".join(sizes)}
-            yield command("geometry create shape block", block_name=own, **corner)
+            yield command("geometry create shape block", block_name=shape_path, **corner)
         else:
             scales = {f"{axis}_scale_factor": size for axis, size in zip("xyz", sizes, strict=True)}
             centre = {"center_marker": full(shape.marker)}
-            yield command("geometry create shape ellipsoid", ellipsoid_name=own, **centre, **scales)
+            yield command("geometry create shape ellipsoid", ellipsoid_name=shape_path, **centre, **scales)
     for name, ends in model.outlines.items():
-        own = full(f"{model.markers[ends[0]].part}.{name}")
+        shape_path = full(f"{model.markers[ends[0]].part}.{name}")
         points = ", ".join(full(end) for end in ends)
-        yield command("geometry create curve outline", outline_name=own, marker_name=points)
+        yield command("geometry create curve outline", outline_name=shape_path, marker_name=points)
 
 
 def format_rotation(angle: float) -> str:

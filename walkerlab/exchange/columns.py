@@ -200,9 +200,9 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
 def remove_unlikely_positions(
     recording: Recording, lines: Sequence[str], least: float | None
 ) -> tuple[Recording, list[str]]:
-    """Replace positions of the markers of `lines` by gaps where their likelihood is below `least`. Also returns notes.
+    """Replace positions of the markers of `lines` by gaps where their likelihood is below `least`. Also return notes.
 
-    Raises ConfigError for a limit without likelihoods in the file.
+    Raises ConfigError if the file has no likelihoods although the user gives a limit.
     """
     markers = dict.fromkeys(marker for line in lines if (ends := LINE.fullmatch(line)) for marker in ends.groups())
     likelihoods = {
@@ -261,7 +261,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
 
 
 def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
-    """Return the angle (rad) that Sports2D subtracted from angles of segments, because the floor leans in its picture.
+    """Return the angle (rad) that Sports2D subtracted from the angles of segments to level the floor in its picture.
 
     Sports2D uses the same sign for walks in both directions, although it mirrors the picture of a walk to the left.
     """
@@ -399,7 +399,7 @@ def normalise_name(name: str) -> str:
 def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Find the column of each quantity: the one with its name, otherwise the only one whose name ends in it.
 
-    Also returns, by quantity, why several columns could be meant.
+    Also return, by quantity, the reason if several columns could be meant.
 
     named  quantities to skip, because the user names their columns
     """
@@ -422,7 +422,7 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
 
 
 def leg_names(name: str) -> list[str]:
-    """Return the name of a leg quantity in exported models, e.g. leg_1.angle for 'angle 1', or nothing for others."""
+    """Return the name of a leg quantity in exported models, e.g. leg_1.angle for 'angle 1', or '' for others."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', normalise_name(quantity))}"] if blank else []
 

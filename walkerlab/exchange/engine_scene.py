@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig
-from walkerlab.errors import ConfigError
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
@@ -20,9 +19,9 @@ from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_m
 from walkerlab.physics.mechanics.parts import Assembly, Knee
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.scene.parts import assembly_of
 
-CREEP_LOAD = 0.1  # ratio of tangential to normal force of a standing foot; about the mean over a walk
+# ratio of tangential to normal force of a standing foot; about the mean over a walk
+CREEP_LOAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -79,6 +78,7 @@ class EngineScene:
         shift, drift = self._centre(angles, rates)
         position = np.array(y[:2]) - shift
         velocity = np.array(y[2 + n : 4 + n]) - drift
+        # Bodies of a locked leg have equal rows, so there may be more equations than angles. They agree.
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
@@ -123,13 +123,14 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
         d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
+    # The base is the hip, so the levers to the hip are zero.
     walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
     return EngineScene(assembly, base, scene.walker, walker, scene.ground, start)
 
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Properties that the native contact model of an engine is tuned to reproduce, SI."""
+    """Properties, in SI units, that the native contact model of an engine is tuned to reproduce."""
 
     mass: float  # mass that rests on one foot (kg)
     gravity: float  # gravity towards the ground (m/s^2)
@@ -162,13 +163,3 @@ def contact_target(scene: EngineScene) -> EngineContact | None:
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     return EngineContact(mass, g, foot.depth, walker.normal.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
-
-
-def refuse_one_knee(config: ContactConfig) -> None:
-    """Raise ConfigError if only one leg has a knee: exports and engines need two legs of one kind."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "exports and engines need two legs of one kind, both with a knee or both without.",
-            "The models of walkerlab walk with one knee: `walkerlab contact-sim`.",
-            ("walker",),
-        )

@@ -124,6 +124,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
         if parts := mjcf.parts_of_script(export):
             yield f"{', '.join(parts)}, which the script {script} applies instead"
     else:
+        # `add_stops` has replaced an ideal lock.
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
         when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"

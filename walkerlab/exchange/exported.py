@@ -15,7 +15,7 @@ import walkerlab
 from walkerlab.config.drives import Hip, push_offs
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.engine_scene import EngineScene, refuse_one_knee, scene_for_engines
+from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
 from walkerlab.exchange.planar import PlanarModel, coupling_rows
 from walkerlab.physics.ground.terrain import STANCE_FOOT, foothold_height
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
@@ -102,7 +102,8 @@ class Exported:
 
     @property
     def knee_links(self) -> tuple[int, ...]:
-        """Index of each leg's shank, or () for straight legs."""
+        """Index of the shank of each leg that has one: both, the first leg's, or ()."""
+        # The first two coordinates are the position of the base.
         return tuple(index - 2 for index in self.scene.knee_indices)
 
     @cached_property
@@ -110,6 +111,7 @@ class Exported:
         """Weights, by link, of the hinge angles of bodies that follow other bodies. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
+            # Only if the weights add up to 1 does the base's angle drop out, so that relative angles suffice.
             if abs(row[0]) > MIN_WEIGHT:
                 raise ConfigError(
                     "A body whose coupling weights do not add up to 1 cannot be exported.",
@@ -199,7 +201,6 @@ def refuse(config: Config) -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
     if config.contact is None:
         raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
-    refuse_one_knee(config)
     if config.contact.terrain == "after-mid-swing":
         raise ConfigError(
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",

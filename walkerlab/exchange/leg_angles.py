@@ -20,7 +20,7 @@ from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
 from walkerlab.exchange.touches import ERRORS
 
-UPRIGHT_RAD: Final = math.pi / 4  # largest median of a leg's angle from the vertical
+UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg's angle from the vertical
 FEWEST_PASSING: Final = 3  # a passing of the legs takes at least this many sample intervals
 TINY: Final = 1e-30  # rad^2, added to a variance that may be zero
 

@@ -20,23 +20,23 @@ Line = tuple[Array, Array]
 """Positions (samples, axes) of the upper and the lower marker (m)."""
 
 NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
-JUMP: Final = 8.0  # a larger change of a line's length between samples is a jump; in standard deviations of all changes
+JUMP: Final = 8.0  # smallest jump of a line's length between samples, in standard deviations of all changes
 SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
-NEIGHBOURS: Final = 5  # number of neighbouring changes with whose median a change is compared
+NEIGHBOURS: Final = 5  # a change is compared with the median of this many neighbouring changes
 HUGE: Final = 1e50  # larger values count as gaps, because their squares overflow
 FEWEST_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
 LONGEST_LEAP: Final = 1.5  # a leap may span at most this many times the number of frozen samples before it
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
 ONE_HIP: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
-NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
+NORMAL: Final = 1.4826  # ratio of standard deviation to median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
 RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
 FAST_PERCENT: Final = 80  # percentile of the motions between samples above which they count as fast
-EXCHANGE: Final = 0.2  # smallest reduction of the squared unevenness by an exchange of legs, in squared fast motions
-SCATTER: Final = 40.0  # smallest reduction as a multiple of the median squared unevenness
+EXCHANGE: Final = 0.2  # an exchange of legs lowers the squared unevenness by at least this many squared fast motions
+SCATTER: Final = 40.0  # and by at least this multiple of the median squared unevenness
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Undo exchanges between the markers of both legs. Returns the lines, and a doubt for each pair that was mended."""
+    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each pair that was mended."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -195,7 +195,7 @@ def stated_direction(walks: str, up: Array) -> Array:
 def unseen_as_gaps(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Replace markers that were not seen by gaps. Also returns, by column, which values were replaced.
+    """Replace markers that were not seen by gaps. Also return, by column, which values were replaced.
 
     Programs write zeros, or another value, for all coordinates of a marker that they did not see. A foot may also stand
     at the origin, so equal coordinates are a gap only if they give the line an unusual length.

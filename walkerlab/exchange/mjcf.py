@@ -37,9 +37,12 @@ from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.parts import knee_dampings
 
-MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
-IMPEDANCE = 1e-3  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
-IMPRATIO = 10.0  # large, so that sliding feet are not pushed off the ground
+# kg m^2, twice MuJoCo's minimum
+MIN_INERTIA = 2e-15
+# small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
+IMPEDANCE = 1e-3
+# large, so that sliding feet are not pushed off the ground
+IMPRATIO = 10.0
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 PAD_M = 0.05
 STEP_S = 2.5e-5
@@ -57,9 +60,9 @@ Slope = Literal["gravity", "geometry"]
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, position across the walk (m), and its leg's links with their lower ends.
+    """Ball of a foot: name, collision group, lateral position (m), and the parts of its leg.
 
-    limbs  link and lower end (m) of each part of the leg to draw, in the link's frame
+    limbs  for each part of the leg that is drawn: its link, and its lower end (m) in the link's frame
     """
 
     name: str
@@ -125,7 +128,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
     centres: list[Floats] = []
     mass_matrix = np.zeros((model.size, model.size))
     for number, link in enumerate(model.links):
-        # rates along the ground, normal to it and of turning (3, coordinates), of the link's material at its hinge
+        # velocity along the ground and normal to it, and rate of turning (3, coordinates), of each link at its hinge
         hinge = np.zeros((3, model.size))
         if link.parent < 0:
             hinge[:, : len(model.freedoms)] = base_rates
@@ -168,6 +171,7 @@ def body_text(
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = "".join(joint_texts(model, link_number, hinges.get(link_number)))
+    # Only the moment about the y axis matters to the walk. Three equal moments are those of a possible body.
     i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     for ball, foot in zip(model.balls, feet, strict=False):
@@ -178,6 +182,8 @@ def body_text(
     for child, hung in enumerate(model.links):
         if hung.parent == link_number:
             inside += body_text(model, child, contact, feet, hinges)
+    # All frames are parallel in the zero position, so the difference of the two hinge points places the body in its
+    # parent.
     return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
 
 
@@ -195,6 +201,8 @@ def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> It
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
     """Write a foot, tuned for ground that is added to the file. `pair_text` tunes the contacts with its own ground."""
     (x, z), mu = ball.centre_m, contact["friction"]
+    # MuJoCo lets two shapes touch if `contype` of one and `conaffinity` of the other share a bit. Pads have only the
+    # latter.
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
         f'contype="{foot.group}" conaffinity="0" condim="3" friction="{mu!r} 0 0" priority="1" '
@@ -256,6 +264,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         half = 0.5 * export.scene.ours.slope
         down = math.hypot(model.gravity_along, model.gravity_down)
         model = replace(model, gravity_along=0.0, gravity_down=down)
+        # This turn about the y axis lowers the ground ahead.
         scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
     pairs = "".join(
         pair_text(model, model.balls[pad.foot], feet[pad.foot], f"pad_{number + 1}", contact)
@@ -277,6 +286,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
     ]
     tree = ElementTree.fromstring("".join(elements))
     ElementTree.indent(tree)
+    # An XML comment must not contain two hyphens in a row.
     comment = "\n".join(line.replace("--", "- -") for line in (*head, *tuning_lines(export, target)))
     return f"<!--\n{comment}\n-->\n{ElementTree.tostring(tree, encoding='unicode')}\n"
 
@@ -381,6 +391,7 @@ def coupling_texts(export: Exported) -> Iterator[str]:
         *before, last = (HIP if link == export.hip_link else f"hinge of {export.names[link]}" for link in coupling)
         weights = list(coupling.values())
         follows = f'joint2="{before[0]}" ' if before else ""
+        # The weighted sum of both angles is zero.
         weight = -weights[0] / weights[-1] if before else 0.0
         yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {COUPLING_SETTINGS}/>'
 

@@ -20,7 +20,7 @@ WINDOW_CLOSES_S = 5.0
 class Walk:
     """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
 
-    It judges by the state at each time step. A knee locks when it has been bent and comes straight, by a plastic impact
+    It reacts to the state at each time step. A knee locks when it has been bent and straightens, by a plastic impact
     or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
 
     stance  index of the stance foot, 0 or 1
@@ -39,11 +39,12 @@ class Walk:
         self.height = base.dofadr[0]
         self.feet = [model.geom(f"foot_{foot}").id for foot in (1, 2)]
         joints = {model.joint(joint).name: joint for joint in range(model.njnt)}
-        self.knees = [joints[name] for name in ("knee_1", "knee_2") if name in joints]
+        # joints by leg, of the legs that have a knee
+        self.knees = {leg: joints[name] for leg, name in enumerate(("knee_1", "knee_2")) if name in joints}
+        self.locks = {leg: model.equality(f"lock_{leg + 1}").id for leg in self.knees}
+        self.stops = {leg: bool(model.jnt_limited[knee]) for leg, knee in self.knees.items()}
         if self.knees:
             self.flexed, self.at_touch = model.numeric("knees").data
-            self.locks = [model.equality(f"lock_{leg}").id for leg in (1, 2)]
-            self.stops = model.jnt_limited[self.knees].copy()
         mujoco.mj_resetDataKeyframe(model, self.data, model.key("gait").id)
         mujoco.mj_forward(model, self.data)
         # directions along the slope and normal to it
@@ -52,7 +53,7 @@ class Walk:
         mujoco.set_mjcb_control(self.control)
 
     def begin(self) -> None:
-        """Stand on the second leg, with its knee locked and the other one free."""
+        """Stand on the second leg, whose knee is locked while the other one is free."""
         self.time_s = -1.0
         self.stance = 1
         self.touches_s: list[float] = []
@@ -60,15 +61,19 @@ class Walk:
         # The trailing knee is released once the leading foot stops sinking in, and after the push-off.
         self.sinks = self.pushes = False
         self.bent = [False, False]
-        for leg in range(len(self.knees)):
-            self.model.jnt_limited[self.knees[leg]] = 0
+        for knee in self.knees.values():
+            # A stop acts only after its knee has bent.
+            self.model.jnt_limited[knee] = 0
 
     def control(self, _model: Any, data: Any) -> None:
-        """Apply push-off and hip torque. Once in a time step, look for a touchdown and turn the knees."""
+        """Apply push-off and hip torque. Once in a time step, also look for touchdowns and update the knees."""
+        # MuJoCo's control callback is global, so it also runs for other data.
         if data is not self.data:
             return
+        # The time falls when somebody resets the walk, as in the viewer.
         if data.time < self.time_s:
             self.begin()
+        # A callback at the same time again, as from `mj_forward`, is no new time step.
         if data.time > self.time_s:
             self.time_s = data.time
             if data.ncon > 0:
@@ -83,7 +88,7 @@ class Walk:
         """Swap feet if the swing foot is on the ground ahead of the stance foot and its knee is locked."""
         data = self.data
         swing = 1 - self.stance
-        if (self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
+        if (swing in self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
             return
         along = data.geom_xpos[self.feet] @ self.along
         if along[swing] > along[self.stance]:
@@ -93,13 +98,14 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Let the friction's damper grow with the load on the feet, as in ADAMS: a strike is many times the weight."""
+        """Let the friction's damper grow with the load on the feet, as in ADAMS. At a strike it is many weights."""
         load = self.data.qfrc_constraint[self.height]
         self.model.opt.impratio = self.impratio * max(1.0, load / self.weight)
 
     def drive(self, swing: int) -> None:
         """Apply the hip torque, and push the trailing foot during a pulse."""
         self.data.qfrc_applied[:] = 0.0
+        # The hip turns leg 1 against leg 2, so the torque on the swing leg changes its sign with the legs' roles.
         self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
         share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
         if self.pushed and 0.0 < share < 1.0:
@@ -109,6 +115,7 @@ class Walk:
         """Push a foot towards the hip. `share` is the elapsed fraction of the pulse."""
         point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
+        # Each foot walks in a lane to one side of the hip, but the push acts in the plane of the walk.
         line[1] = 0.0
         force = 30.0 * (share * (1.0 - share)) ** 2 * impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]
@@ -125,8 +132,9 @@ class Walk:
             self.sinks = self.sinks and not self.at_touch and motion[3:] @ self.up < 0.0
             if not self.sinks and (not self.pushed or data.time >= self.touches_s[-1] + self.duration):
                 self.pushes = self.bent[trailing] = False
-                data.eq_active[self.locks[trailing]] = 0
-        for leg, knee in enumerate(self.knees):
+                if trailing in self.knees:
+                    data.eq_active[self.locks[trailing]] = 0
+        for leg, knee in self.knees.items():
             if data.eq_active[self.locks[leg]]:
                 continue
             bend = data.qpos[model.jnt_qposadr[knee]]
@@ -146,6 +154,8 @@ class Walk:
         # a knee that locks by its stop keeps the stop's compression
         model.eq_data[self.locks[leg], 0] = data.qpos[model.jnt_qposadr[knee]] if self.stops[leg] else 0.0
         data.eq_active[self.locks[leg]] = 1
+        # With so few degrees of freedom MuJoCo's Jacobian is dense. The lock, active only from now on, is not in it
+        # yet.
         held = data.efc_J.reshape(-1, model.nv)[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
         rows = np.vstack((held, np.eye(model.nv)[model.jnt_dofadr[knee]]))
         columns = np.zeros_like(rows)
@@ -185,8 +195,8 @@ def main(path: str, steps: int, view: bool) -> None:
     period = np.diff(walk.touches_s, prepend=0.0)[-1]
     length = np.diff(walk.touches_m, prepend=0.0)[-1]
     its_periods, its_lengths = walk.model.numeric("steps_in_walkerlab").data.reshape(2, -1)
-    known = min(steps, len(its_periods))
-    theirs = f"step {known} in walkerlab: {its_periods[known - 1]:.4f} s, {its_lengths[known - 1]:.4f} m"
+    compared = min(steps, len(its_periods))
+    theirs = f"step {compared} in walkerlab: {its_periods[compared - 1]:.4f} s, {its_lengths[compared - 1]:.4f} m"
     print(f"step {steps}: {period:.4f} s, {length:.4f} m; {theirs}")
 
 

@@ -14,8 +14,10 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 PINNED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-SMALLEST_INERTIA = 1e-13  # as a multiple of mass x length^2; engines reject bodies without inertia
-SMALLEST_BALL_M = 5e-4  # radius of the ball that replaces a point foot in engines; larger than any penetration
+# as a multiple of mass x length^2; engines reject bodies without inertia
+SMALLEST_INERTIA = 1e-13
+# radius of the ball that replaces a point foot in engines; larger than any penetration
+SMALLEST_BALL_M = 5e-4
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,7 @@ def planar_model(
             grow(neighbour)
 
     grow(root)
+    # The rows have room for as many links as bodies. If knees are locked there are fewer links.
     chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
     links = tuple(lump_bodies(assembly, *link) for link in zip(members, hinges, strict=True))
     balls = []

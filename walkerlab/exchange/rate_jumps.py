@@ -23,7 +23,7 @@ WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
 MOST_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
 WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
-SAMPLES_ON_A_SIDE: Final = 4  # fewest samples before and after an instant for a fit
+SAMPLES_ON_A_SIDE: Final = 4  # minimum number of samples for a fit, before and after an instant
 DEGREE: Final = 3
 SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum

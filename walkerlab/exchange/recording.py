@@ -70,7 +70,7 @@ SEGMENTS: Final = "Sports2D (angles)"
 SEGMENT_NAMES: Final = frozenset({"right thigh", "left thigh"})
 """Names of segments, in a table of angles that Sports2D wrote."""
 NO_FILE: Final = "there is no such file"
-LONGEST_PATH: Final = 200  # characters of a path that messages show
+LONGEST_PATH: Final = 200  # maximum number of characters of a path in a message
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
 ACCEPTED_FORMATS: Final = (
@@ -132,7 +132,8 @@ class Recording:
 
 
 def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
-    """Read the columns of a file, in the format of its extension. `key` is the config key that names it, if one does.
+    """Read the columns of a file, in the format of its extension. `key` is the config key that names the file, if there
+    is one.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
@@ -192,7 +193,7 @@ def read_delimited(path: Path) -> Recording:
         if beginning.match(text):
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
     lines = merge_headers(remove_blanks(text.splitlines()))
-    delimiter, header, unit_row, first = header_of(path, lines)
+    delimiter, header, unit_row, first = find_header(path, lines)
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
@@ -260,11 +261,11 @@ def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[Row]:
             yield reader.line_num, cells
 
 
-def header_of(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[str], int]:
+def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[str], int]:
     """Find the header: the first row of names above a row of as many values, perhaps with a row of units between them.
 
     Returns the delimiter, the names, the units ('' without a row of units), and the line number of the first values.
-    A table with several columns takes precedence over a table with one column, and words as names over numbers.
+    Tables with several columns are preferred to those with one, and names that are words to those that are numbers.
     """
     tops = [(delimiter, list(rows_of(lines[:HEADER_LINES], delimiter))) for delimiter in DELIMITERS]
     places = [(rows[k : k + 3], delimiter) for delimiter, rows in tops for k in range(len(rows) - 1)]

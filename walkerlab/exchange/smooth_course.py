@@ -30,9 +30,9 @@ SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree 
 FAR_PERCENT: Final = 80  # percentile of the angle between the legs above which they count as far apart
 SEARCH_RANGE: Final = 0.3  # time before and after a first guess of a strike to search, as a fraction of a step
 MARGIN: Final = 0.2  # time around the neighbouring strikes that the fit of a strike leaves out, as a fraction of a step
-WIDEST: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
-FASTEST: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
-BRIEF: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
+MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
+MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
+MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
 LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step; a longer one is a lasting jump
 BORDER: Final = 0.1  # part of a step at the far end of a fit that other fits cover
 LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
@@ -222,7 +222,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
 def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
     """Find the stretches that begin and end with a jump faster than a leg can move."""
     moved = np.diff(angle, axis=0)
-    fastest = FASTEST * float(np.percentile(np.abs(moved), FAR_PERCENT))
+    fastest = MAX_MOTION * float(np.percentile(np.abs(moved), FAR_PERCENT))
     found = []
     for leg in (0, 1):
         jumps = np.flatnonzero(np.abs(moved[:, leg]) > fastest).tolist()
@@ -287,7 +287,7 @@ class Course:
         begin, end = self.spans[index]
         at = self.guess(index)
         margin = MARGIN * self.step_s
-        farthest = WIDEST * self.step_s
+        farthest = MAX_FIT_TIME * self.step_s
         first = max(self.guess(index - 1) + margin, at - farthest) if index else float(self.time[0])
         following = index + 1 < len(self.spans)
         last = min(self.guess(index + 1) - margin, at + farthest) if following else float(self.time[-1])
@@ -318,7 +318,9 @@ def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> C
     spread = angle[:, 0] - angle[:, 1]
     far = WINDOW_AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
     apart = apart_runs(np.abs(spread) > far, spread > 0.0)
-    shortest = BRIEF * float(np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT))
+    shortest = MIN_TIME_AHEAD * float(
+        np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT)
+    )
     runs: list[tuple[int, int]] = []
     for first, last in apart:
         # outliers make brief runs, and cut a run in two

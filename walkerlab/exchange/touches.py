@@ -26,7 +26,7 @@ ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
 """These degrees and one more, which shows the bias of the highest."""
 MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
-WIDEST: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
+MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
 SHORTEST: Final = 0.25  # fraction of the step period; nearer crossings of one leg are one heel strike
 SLOWEST: Final = 0.25  # fraction of the median speed of falling feet; a slower crossing is no heel strike
 ITERATIONS: Final = 20
@@ -98,9 +98,11 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     """Return the time and leg of each candidate heel strike, where the front foot comes down to the level of the rear
     one. Noise can produce several candidates for one strike.
     """
-    # A recording may end with a heel strike, so its last two samples are continued by half an interval.
-    time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
-    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
+    # A recording may end with a heel strike, perhaps with two samples at that instant, so it is continued by half the
+    # interval before.
+    before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
+    time = np.append(time, 1.5 * time[-1] - 0.5 * time[before])
+    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
     spread = angle[:, 0] - angle[:, 1]
     over = height(angle)
     apart = WINDOW_AHEAD * np.abs(spread).max()
@@ -134,7 +136,7 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     begin = float(time[0])
     if abs(spread[0]) <= WINDOW_AHEAD * np.abs(spread).max():
         return None
-    rows = time - begin <= WIDEST * period
+    rows = time - begin <= MAX_FIT_TIME * period
     t, y = time[rows] - begin, angle[rows]
     fits = fit_degrees(t, y, 0.0)
     degree = best_degree(fits)
@@ -183,7 +185,7 @@ def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple
     row = int(np.searchsorted(time, near))
     away = np.sort(np.abs(time[max(0, row - 2 * MIN_SAMPLES) : row + 2 * MIN_SAMPLES] - near))
     wanted = float(away[: 2 * MIN_SAMPLES][-1])
-    rows = rows_within(time, near, max(WINDOW * period, min(wanted, WIDEST * period)))
+    rows = rows_within(time, near, max(WINDOW * period, min(wanted, MAX_FIT_TIME * period)))
     return time[rows] - near, angle[rows]
 
 
@@ -282,7 +284,7 @@ def angles_at_jumps(
     period  step period (s)
     errors  number of standard errors
     """
-    half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), WIDEST * period)
+    half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), MAX_FIT_TIME * period)
     inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
     near = [(touch.time_s, rows_within(time, touch.time_s, half)) for touch in inside]
 

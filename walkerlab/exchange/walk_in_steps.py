@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -25,14 +26,14 @@ from walkerlab.physics.mechanics.rigid_model import (
     SWING,
     RigidModel,
     apply_couplings,
-    feet_on_slope,
+    compute_in_turns,
     step_lengths,
 )
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-SHANK: Final = 1.4  # smallest ratio of a shank's farthest angle behind to that at heel strikes; for a thigh it is 1
+SHANK: Final = 1.4  # a leg whose farthest angle behind is this many times that at heel strikes is a shank
 WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
@@ -43,7 +44,7 @@ PLAUSIBLE: Final = (1e-6, 1e6)
 NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
 SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
 LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
-FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
+FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
 SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for the tilt begins
@@ -53,8 +54,9 @@ FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging leg
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
-CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
+COARSE: Final = 0.2  # largest spacing of recorded values, as a fraction of an error that they can show
+CONSTANT: Final = 0.25  # an error is constant if its scatter over a step is at most this fraction of it
+SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
 
@@ -72,7 +74,7 @@ class RecordedSteps:
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
     origin_s: float  # the recording's time at the first heel strike
-    doubts: tuple[str, ...]  # what is odd about the heel strikes
+    doubts: tuple[str, ...]  # oddities of the heel strikes
 
 
 def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:
@@ -86,17 +88,15 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     angle = legs(walk)
     refuse_noise(angle, source)
 
-    def total(angles: Array) -> Array:
-        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
-
     def height(angles: Array) -> Array:
-        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs of equal length."""
-        half = 0.5 * (total(angles) - touch_sum_rad)
-        return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
+        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs."""
+        return np.asarray(hips_apart(model, angles - 0.5 * touch_sum_rad).real + rise_of_soles(model))
 
     touches = find_touches(walk.time_s, angle, height)
     refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
+    if model.legs_differ and len(touches) > 1 and touches[1].leg == 1:
+        touches = touches[1:]  # as in computed walks, leg 1 swings first
     if len(touches) < 2:
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
@@ -106,14 +106,42 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
-    refuse_hurry(step_s, model, source)
+    refuse_short_steps(step_s, model, source)
     refuse_spread(walk, touches, source)
     offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    # energy jumps at heel strikes, so that the clock shows only if these are certain
+    # Energy jumps at heel strikes, so the clock's rate can be seen only if these are certain.
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
+
+
+def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
+    """Return the vectors (samples,) in m from the hip over leg 0's foot centre to that over leg 1's, normal + i along.
+
+    angles  (samples, 2) of straight legs, from the vertical
+    """
+    levers = [
+        (each.hip_y - 1j * each.hip_x) * np.exp(1j * (angles[:, leg] + model.slope))
+        for leg, each in enumerate((model.exchanged, model))
+    ]
+    return np.asarray(levers[1] - levers[0])
+
+
+def rise_of_soles(model: RigidModel) -> float:
+    """Return the radius of leg 1's foot minus that of leg 0's (m). Leg 0 stands in the exchanged model."""
+    return float(model.radius - model.exchanged.radius)
+
+
+def sum_over_level(model: RigidModel, angles: Array) -> Array:
+    """Return the sums (samples,) of the angles of straight legs minus their sum with both feet on the slope (rad).
+
+    For legs that are alike, these are the sums of the angles from the slope's normal.
+    """
+    apart = hips_apart(model, angles)
+    direction = np.angle(apart)
+    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), SMALLEST), -1.0, 1.0))
+    return np.asarray(2.0 * (direction - np.sign(direction) * level))
 
 
 def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
@@ -122,10 +150,7 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
     angle = legs(walk)
-
-    def total(angles: Array) -> Array:
-        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
-
+    total = partial(sum_over_level, model)
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
@@ -160,16 +185,18 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
 def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
-    Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
-    by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
-    turns gravity, and is fitted as well.
+    Energy is constant within a step of straight legs that nothing drives. If the clock runs fast by a factor r, the
+    measured kinetic energy is too small by r^2. So the ratio of its changes to those of the potential energy gives r.
+    The tilt of the recording, which turns gravity, is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
         return steps
+    first = model.exchanged if steps.swapped else model
     order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
     angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
     energy, ahead, behind = (
-        energies(model, np.concatenate((angles + turn, rates), axis=1)) for turn in (0.0, TURN_RAD, -TURN_RAD)
+        compute_in_turns(first, steps.step, energies, np.concatenate((angles + turn, rates), axis=1))
+        for turn in (0.0, TURN_RAD, -TURN_RAD)
     )
     turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
     columns = np.column_stack((energy, turning))
@@ -204,7 +231,9 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
     """Yield a sentence for each leg of a kneed walker whose angle may not be that of the thigh."""
-    for leg, name in enumerate(("angle 1", "angle 2") if model.kneed else ()):
+    for leg, name in enumerate(("angle 1", "angle 2")):
+        if not (model, model.exchanged)[leg].kneed:
+            continue
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -240,7 +269,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
     all_jumps = angles_at_jumps(time, angle, touches, period)
     jumps = [all_jumps, *(angles_at_jumps(time, angle, side, period, SIDE_ERRORS) for side in sides)]
     shift = max((jump[0] for jump in jumps if jump), key=abs, default=0.0)
-    sums = np.mean(feet_on_slope(model, *all_jumps[1].T)) - touch_sum_rad if all_jumps else 0.0
+    sums = np.mean(sum_over_level(model, all_jumps[1])) - touch_sum_rad if all_jumps else 0.0
     spreads = [np.array([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in side]) for side in sides]
     periods = np.diff([touch.time_s for touch in touches])
     lengths = [2.0 * model.leg_length * math.sin(0.5 * float(np.mean(each))) for each in spreads if each.size]
@@ -334,7 +363,7 @@ def unit_doubts(touches: list[Touch]) -> Iterator[str]:
         )
 
 
-def refuse_hurry(step_s: float, model: RigidModel, source: str) -> None:
+def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
@@ -407,7 +436,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
                 velocities[row] = rates[order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    lengths = lengths_of(model, angles_rad, step, len(times))
+    lengths = lengths_of(model.exchanged if swapped else model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
     errors = np.array([touch.error_s for touch in touches])
     return RecordedSteps(
@@ -460,7 +489,10 @@ def spline_through(time: Array, columns: Array) -> BSpline:
 
 
 def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
-    """Return the step lengths (m) from the leg angles at the beginning and end of each step."""
+    """Return the step lengths (m) from the leg angles at the beginning and end of each step.
+
+    model  the one of the first step
+    """
     n = len(model.arm_x)
     states = np.zeros((2, count, 2 * n))
     for number in range(count):
@@ -470,4 +502,4 @@ def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: 
             bodies = np.zeros(n)
             bodies[SWING], bodies[STANCE] = angle[row, swing], angle[row, stance]
             states[end, number, :n] = apply_couplings(model, STRAIGHT, bodies)
-    return step_lengths(model, *states)
+    return compute_in_turns(model, np.arange(count), step_lengths, *states)

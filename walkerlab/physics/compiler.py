@@ -30,9 +30,10 @@ from walkerlab.physics.kernel_cache import cache_folder, files_of, lock_of, watc
 CHECKSUM_BYTES = 32  # of SHA-256, before a kernel's stored code
 # index of the signature in the stored tuple
 SIGNATURE = 3
-# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit.
-# No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting would take as
-# long as the arithmetic.
+# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit;
+# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, without a test for an
+# exception. No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting
+# would take as long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 bodies: dict[type, list[Callable[..., Any]]] = {}
 """Functions that compiled code calls for a class, by class (see `kernels.ByType`)."""
@@ -92,6 +93,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             # a class defined in a notebook is a different class in the next process
             if payload is not None and payload[SIGNATURE].args == tuple(signature):
                 files_in_use.add(name)
+                # As in numba's own cache: code can be rebuilt only in an initialised context.
                 context.refresh()
                 return CompileResult._rebuild(context, *payload)
         for notify in watchers:
@@ -106,7 +108,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             files_in_use.add(name)
 
     def file_name(self, signature: Any) -> str:
-        """Return the file name for some argument types. It depends on all code outside the sources of kernels."""
+        """Return the cached file's name for these argument types, with a hash of all code outside the kernels."""
         function = self.py_func
         location = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""
@@ -165,6 +167,7 @@ def outside_sources(function: Callable[..., Any], classes: list[type]) -> Iterat
         known = [name for name in importable if sources.module(name) is not None]
         yield from ((module.name, module.text) for module in sources.closure(*known) if module.name != PACKAGE)
         files = {each.__code__.co_filename for each in functions if each.__module__ in outside.difference(known)}
+        # `linecache` also knows the cells of a notebook, which are in no file.
         yield from ((file, "".join(linecache.getlines(file)).encode()) for file in sorted(files))
 
 

@@ -41,6 +41,7 @@ TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 # the only packages that may hold compiled functions; a test checks this
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
+# A file may register a body with `.case(` without importing `kernels`.
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
 UNUSED_S = 30 * 86_400.0  # older generations are deleted if no process has opened them for this long
@@ -203,11 +204,14 @@ def cache_folder() -> Path:
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
     if os.path.lexists(folder):
+        # This may delete the folder, which is then created again.
         folder = _closed_to_others(folder)
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
+        # Only a new folder can make them too many.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
+    # `_remove_unused` reads the time of the last use from the folder's time of change.
     os.utime(folder)
     return folder
 

@@ -31,7 +31,7 @@ C = TypeVar("C", bound=type)
 
 
 def kernel(function: F) -> F:
-    """Compile `function` on its first call and keep the machine code on disk. In kernels it is a `kernel_part`."""
+    """Compile `function` on its first call and keep the machine code on disk. Kernels can call it."""
     if numba.config.DISABLE_JIT:
         return function
     return cast(F, Kernel(function, targetoptions={"nopython": True, **FLAGS}))
@@ -107,6 +107,7 @@ class ByType:
         return register
 
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
+        # Numbers and arrays have no class here. NoneType has no case, so they get the default body.
         chosen = getattr(kind, "instance_class", type(None))
         return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
 

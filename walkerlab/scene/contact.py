@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # derivatives of a radau5 step are exact
+# The derivatives of a radau5 step are exact.
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
 
@@ -112,6 +113,7 @@ def scene_on_pads(
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
         pitch = float(search.gait.lengths_m.mean())
         if len(search.gait.steps) > 1:
+            # Pads lie where the feet touch, and these distances differ from those between sections.
             first, second = lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)
@@ -129,6 +131,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
+    # A knee that is free in the rigid strike must not be rigid while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
@@ -150,10 +153,11 @@ def require_contact(config: ContactConfig) -> Contact:
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait on pads one step of that gait apart, searching from a rigid start state.
+    """Find the contact model's gait on pads whose pitch is the step length of that gait, starting from a rigid state.
 
     rigid_step_length_m  initial pad pitch
     """
+    # A gait has no pinned step, and the search replaces this pitch by the gait's step length.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)
@@ -213,6 +217,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
+    # The bodies of a straight leg turn as one in the rigid model; here each has its own angle.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -226,6 +231,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
+    # By definition, the static penetration is that under the whole weight, not under its part normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 

@@ -52,6 +52,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
+    # Any step length will do to see whether two scenes differ.
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
     first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
@@ -66,7 +67,7 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a parameter affects a model. Returns True if the config allows no neighbouring value to test with."""
+    """Whether a parameter affects a model. This is assumed if the config allows no neighbouring value for a test."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -81,7 +82,7 @@ def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Build the error about the config key `where` that names a parameter `key` which affects none of the models."""
+    """Build the error for a config key `where` that names a parameter `key` which none of the models uses."""
     return ConfigError(
         f"{where}: {key} does not affect the {' or the '.join(models)} model",
         "Choose a key that the model uses, or another model (--model).",

@@ -1,7 +1,7 @@
 """Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
 
-Kneed walkers are tried with their feet slightly ahead of the shanks, as in real machines. Gaits are searched for on a
-few slopes, and their branches are followed over the slope.
+For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
+on a few slopes and follows their branches over the slope.
 """
 
 import math
@@ -23,7 +23,8 @@ from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
-COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on these slopes
+# rad; most walkers that have gaits have them on these slopes
+COMMON_SLOPES = (0.03, 0.12)
 # rad; the steepest slope to which gaits are followed lies between these
 MIN_FOLLOWED_TO = 0.2
 MAX_FOLLOWED_TO = 0.35
@@ -42,18 +43,21 @@ class SlopeRange:
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the range, at the end nearer to `target`, preferring the range of stable gaits."""
+        """Return a slope just inside the range, at its end nearer to `target`. The range of stable gaits takes
+        precedence.
+        """
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
         return near + INSET * (far - near)
 
 
 def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
-    """Return the nearest range of slopes with gaits, preferring stable gaits, or None if no gait is found."""
+    """Return the nearest range of slopes with gaits, or None if no gait is found. Stable gaits take precedence."""
     slope = config.slope_rad
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
     for value in (*(factor * slope for factor in SLOPE_FACTORS), *COMMON_SLOPES):
+        # A search is slow, so it stops at the first stable gaits.
         if value in span and not any(candidate.stable for candidate in ranges):
             ranges += walkable_ranges(follow(SLOPE.vary(config, rigid_walker), span, value))
     return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, slope)), default=None)
@@ -73,10 +77,11 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield the range of slopes of each branch on which the ground need not pull on the foot, and its longest stable
-    part.
+    """Yield, for each branch, the slopes on which the ground need not pull on the foot, with the longest range of
+    stable gaits among them.
     """
     for branch in branches:
+        # The first monitor of the rigid model is the minimum normal force.
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
             continue
@@ -91,7 +96,7 @@ def suggest_gaits(scene: RigidConfig) -> str:
     """Suggest gaits near a scene that has none, as commands, or return '' on slopes that do not descend."""
     if scene.slope_rad <= 0.0:
         return ""
-    config = rigid_alone(scene)
+    config = rigid_config(scene)
     feet = find_gait_with_feet_ahead(config)
     suitable = find_slopes_with_gaits(config)
     advice = []
@@ -119,7 +124,7 @@ def round_inward(low: float, high: float) -> tuple[float, float]:
     return rounded if rounded[0] < rounded[1] else (low, high)
 
 
-def rigid_alone(scene: RigidConfig) -> Config:
+def rigid_config(scene: RigidConfig) -> Config:
     """Return a config with only the keys on which a gait of the rigid model depends."""
     data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
     push_off = {"impulse_N_s": scene.push_off.impulse_N_s, "leg_2": scene.push_off.leg_2}
@@ -139,6 +144,7 @@ def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
 def feet_ahead(config: Config) -> tuple[float, ...]:
     if not isinstance(config.walker, Kneed):
         return ()
+    # Rounded as in the suggested command, so that the command gives the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 

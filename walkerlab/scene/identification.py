@@ -17,7 +17,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
-from walkerlab.physics.estimation.judgement import judge
+from walkerlab.physics.estimation.judgement import LIMP, alternates, judge
 from walkerlab.physics.estimation.measured_multipliers import measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
@@ -26,22 +26,33 @@ from walkerlab.physics.estimation.result import (
     USABLE,
     Estimate,
     EstimateSensitivity,
+    FirstLeg,
     Identification,
+    Information,
+    LegDifference,
     ModelFit,
     Pull,
     StepTable,
     Uncertain,
 )
 from walkerlab.physics.orbits.family_search import RIGID
+from walkerlab.physics.orbits.gradients import sensitivity_norms
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
-from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
+from walkerlab.physics.orbits.robustness import GaitOnMap, derivative
 from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import model_reads, scene_for
-from walkerlab.scene.parameter import R, config_with, parameter_keys, parameter_of
+from walkerlab.scene.families import model_reads, scene_for, steps_of_stride
+from walkerlab.scene.parameter import (
+    R,
+    config_with,
+    first_leg_path,
+    mass_of_second_leg,
+    parameter_keys,
+    parameter_of,
+)
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -67,21 +78,24 @@ class Fixed(NamedTuple):
         return self.value != 0.0 and self.name not in KNOWN
 
 
+LEGS: Final = (1, 2)
 Begin = Callable[[str, int], Callable[[], None]]
 KEPT_CONFIGS: Final = 512  # numbers of changed configs and of their walkers that are cached
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
-CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
+# Walk errors are near 1e-10, far below noise.
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
-DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
-PROMISING_GAIN: Final = 1.4  # of the log-likelihood with the noise as it is, below which one more is not pursued
-REFIT_ROUNDS: Final = 3  # of a fit with a freed parameter; its gain hardly changes after them
-SMALLEST_CHANGE: Final = 1e-4  # of a freed parameter, in its scale, that explains anything
-RARE_GAIN: Final = 0.01  # probability of a gain in right walks, with as many values, above which it is no surprise
+DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
+PROMISING_GAIN: Final = 1.4  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+REFIT_ROUNDS: Final = 3  # rounds of a new fit with a freed parameter; its gain hardly changes after them
+MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
+SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
+RARE_GAIN: Final = 0.01  # a gain is surprising if it is more improbable than this under the right model
 KNOWN: Final = ("gravity_m_s2",)
 """Parameters whose value is beyond doubt."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
@@ -96,6 +110,7 @@ class ConfigFamily:
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(KEPT_CONFIGS)(partial(config_with, config, self.parameters))
         self.rigid_walker = lru_cache(KEPT_CONFIGS)(self.vary(rigid_walker))
+        self.stride = max((steps_of_stride(config, each) for each in self.parameters), default=1)
 
     def admits(self, values: Values) -> bool:
         return self.rigid_walker(values) is not None
@@ -116,14 +131,35 @@ class ConfigFamily:
         return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])
 
 
-def step_map_of(subject: ModelUnderTest, family: ConfigFamily) -> StepMap:
-    """Return a model's step map as a function of the family's parameter values."""
-    if subject.model == RIGID:
-        return RigidMap(family.rigid_walker, 1.0, rigid_walker(subject.config), RIGID_WALKS)
-    from walkerlab.physics.orbits.contact_map import ContactMap
+def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None = None) -> StepMap:
+    """Return a model's step map as a function of the family's parameter values.
 
-    scene = scene_for(subject.length_m)
-    return ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config))
+    leg  the one that swings in the first complete step; by default that from the subject's state
+    """
+    swing = steps_before(subject, family, leg)
+    step_map: StepMap
+    if subject.model == RIGID:
+        walker_at = family.vary(lambda config: rigid_walker(config).exchanged) if swing else family.rigid_walker
+        step_map = RigidMap(walker_at, 1.0, rigid_walker(subject.config), RIGID_WALKS)
+    else:
+        from walkerlab.physics.orbits.contact_map import ContactMap
+
+        scene = scene_for(subject.length_m)
+        site = scene(subject.config)
+        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, site, swing)
+    step_map.stride = family.stride
+    return step_map
+
+
+def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
+    """Return the number of steps from the subject's state to the start of its `step_map_of`."""
+    return ((leg or subject.first_leg) - subject.first_leg) % family.stride
+
+
+def gait_start(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> Floats:
+    """Return the gait's section coordinates (d,) at the start of `step_map_of`."""
+    p: Any = family.start
+    return step_map_of(subject, family).step(subject.z, p).z if steps_before(subject, family, leg) else subject.z
 
 
 def identify_walk(
@@ -153,8 +189,13 @@ def identify_walk(
             f"no walk of the model can be fitted: {verdicts[0].reasons[0]}.",
             "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters.",
         )
-    best = max(answers, key=lambda answer: (answer.models[0].usable, answer.models[0].log_likelihood))
-    return replace(best, models=verdicts)
+    return replace(max(answers, key=rank), models=verdicts)
+
+
+def rank(answer: Identification) -> tuple[bool, float]:
+    """Return a key that sorts results: those that fit, then by their likelihood."""
+    verdict = answer.models[0]
+    return verdict.usable, verdict.log_likelihood or -math.inf
 
 
 def identify_with(
@@ -166,14 +207,43 @@ def identify_with(
     note: Callable[[str], None],
     begin: Begin,
 ) -> Identification | str:
-    """Fit one model, or return the reason as text if no walk of the model can be fitted."""
+    """Fit one model, or return the reason as text if no walk of the model can be fitted.
+
+    If it is not known which leg of two that differ swings first, both are tried.
+    """
     subject = find_model_gait(model, config, gait, note)
+    stride = ConfigFamily(config, question.keys).stride
+    if stride == 1 or measured.first_leg is not None:
+        answer = identify_beginning(subject, measured, question, begin)
+        stated = FirstLeg(measured.first_leg, "statement", None) if stride > 1 and measured.first_leg else None
+        return answer if isinstance(answer, str) else replace(answer, first_leg=stated)
+    walks = {leg: replace(measured, first_leg=leg) for leg in LEGS}
+    results = {leg: identify_beginning(subject, walk, question, begin) for leg, walk in walks.items()}
+    answers = {leg: result for leg, result in results.items() if isinstance(result, Identification)}
+    if not answers:
+        return next(reason for reason in results.values() if isinstance(reason, str))
+    leg = max(answers, key=lambda leg: rank(answers[leg]))
+    other = answers.get(sum(LEGS) - leg)
+    if other is None or rank(other)[0] < rank(answers[leg])[0]:
+        return replace(answers[leg], first_leg=FirstLeg(leg, "likelihood", None))
+    gain = rank(answers[leg])[1] - rank(other)[1]
+    if gain > DECISIVE_GAIN:
+        return replace(answers[leg], first_leg=FirstLeg(leg, "likelihood", gain))
+    return replace(answers[leg], first_leg=FirstLeg(leg, "guess", gain), other_differences=other.leg_differences)
+
+
+def identify_beginning(
+    subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
+) -> Identification | str:
+    """Fit a model to a walk whose first step is that of `measured.first_leg`. Returns as `identify_with`."""
+    model = subject.model
     problem = problem_of(subject, measured, question)
+    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
         fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
-        for number, start in enumerate(starts_of(problem, question.starts), 1)
+        for number, start in enumerate(fit_starts(problem, question.starts), 1)
     ]
     predicted = [result for result in fits if result is not None]
     if not predicted:
@@ -202,9 +272,10 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
 
 def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> FitProblem:
     family = ConfigFamily(subject.config, question.keys)
-    walks = step_map_of(subject, family)
-    directions = felt_directions(walks, subject.z, family.start)
-    forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.sensors)
+    walks = step_map_of(subject, family, measured.first_leg)
+    z = gait_start(subject, family, measured.first_leg)
+    directions = felt_directions(walks, z, family.start)
+    forecast = Forecast(walks, family.admits, family.scales(), z, directions, measured, question.sensors)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
@@ -213,7 +284,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
 
 
-def starts_of(problem: FitProblem, count: int) -> list[Floats]:
+def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
     rng = np.random.default_rng(0)
     count_parameters = problem.forecast.scales.size
@@ -248,13 +319,18 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         )
     )
     pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(best, keys, question.prior))
-    fixed = [*fixed_parameters(subject, question, best)]
+    second_leg = mass_of_second_leg(subject.config) if forecast.walks.stride == 1 and alternates(steps) else None
+    fixed = [*fixed_parameters(subject, question, best, fixed_keys(subject, question))]
+    # Leg 2 follows leg 1 while the parameters of both legs change, so that one of its own is changed alone.
+    other_leg = [*fixed_parameters(subject, question, best, [second_leg])][:1] if second_leg else []
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        determined = len(left_open) < len(keys)
-        suggested = suggest_parameter(subject, keys, fixed, best) if determined else ()
+        others = (other_leg, fixed) if len(left_open) < len(keys) else ()
+        suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
         reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
+    elif second_leg and verdict[1][0].endswith(LIMP):
+        verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
     dof = max(1, best.data.residuals.size - best.u.size)
     gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)
     walk = forecast.predict(best.u, best.heights_m)
@@ -277,7 +353,27 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         nuisances_with_errors(best, question.sensors),
         tuple(sensitivities(fixed, best, estimates, subject.config)),
         measure_radius(steps, gait["spectral_radius"].value) if gait else None,
+        tuple(leg_differences(subject.config, estimates, information)),
     )
+
+
+def leg_differences(
+    config: ContactConfig, estimates: Sequence[Estimate], information: Information
+) -> Iterator[LegDifference]:
+    """Yield the difference between the legs for each estimated key of leg 2 whose value in leg 1 is known."""
+    known = {parameter_of(each.key, config).path: index for index, each in enumerate(estimates)}
+    for index, estimate in enumerate(estimates):
+        path = parameter_of(estimate.key, config).path
+        first = first_leg_path(path)
+        value = value_at(config, first)
+        if first == path or value is None or estimate.standard_error is None:
+            continue
+        weights = np.eye(len(estimates))[index]
+        if first in known:
+            weights[known[first]] = -1.0
+            value = estimates[known[first]].value
+        error = math.sqrt(weights @ information.covariance @ weights)
+        yield LegDifference(estimate.key, estimate.value - value, error, estimate.unit)
 
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
@@ -304,6 +400,7 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
+            # The difference between a prior and the estimate that includes it has this variance.
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
@@ -315,7 +412,7 @@ def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
 
 def describe_pull(pull: Pull) -> str:
     return (
-        f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
+        f"the walk contradicts the {pull.against} of {pull.value:g} for {pull.key} by {pull.standard_deviations:.2g} "
         "standard deviations"
     )
 
@@ -335,10 +432,9 @@ def suggest_parameter(
     measured = np.array([other.measured for other in others])
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
-    for index in np.lexsort((-gains, ~measured)).tolist() if others else ():
+    order = np.lexsort((-gains, ~measured)).tolist() if others else []
+    for index in [each for each in order if gains[each] >= PROMISING_GAIN][:MAX_FREED]:
         other = others[index]
-        if gains[index] < PROMISING_GAIN:
-            continue
         gain, part, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(part, 0.0) / values)) < RARE_GAIN
         decisive = gain > DECISIVE_GAIN if other.measured else part > DECISIVE_GAIN and rare
@@ -388,9 +484,9 @@ def gain_of_freeing(
 def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:
     """Return a problem that fits one more parameter, the last of `keys`."""
     family = ConfigFamily(subject.config, keys)
-    forecast = replace(
-        problem.forecast, walks=step_map_of(subject, family), admits=family.admits, scales=family.scales()
-    )
+    forecast = problem.forecast
+    walks = step_map_of(subject, family, forecast.measured.first_leg)
+    forecast = replace(forecast, walks=walks, admits=family.admits, scales=family.scales())
     bounds = [*problem.bounds, (-math.inf, math.inf)]
     return replace(problem, forecast=forecast, start=family.start, bounds=bounds)
 
@@ -400,7 +496,7 @@ def sensitivities(
 ) -> Iterator[EstimateSensitivity]:
     """Yield how much each determined estimate changes if a fixed parameter is 1 % larger, to first order.
 
-    The change of an estimate is that of least squares with the noise as it is, without bounds.
+    The changes are those of a least-squares fit with the present noise and without bounds.
     """
     data = fitted.data
     prior = np.column_stack((np.zeros(len(data.prior)), data.prior[:, 1:]))
@@ -416,7 +512,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. For lengths and inertias of zero, use the leg. Drives of zero do not change."""
+    """Return 1 % of a parameter. A length or inertia of zero changes by 1 % of that of a leg, a drive not at all."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -425,19 +521,26 @@ def one_percent(parameter: Fixed, config: ContactConfig) -> float:
     return 0.0
 
 
-def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[Fixed]:
-    """Yield each parameter and nuisance that is not estimated and along which walks can be predicted."""
+def fixed_keys(subject: ModelUnderTest, question: Identify) -> list[str]:
+    """Return the keys of the parameters that the model reads and that are not estimated."""
+    config = subject.config
+    estimated = {parameter_of(key, config).path for key in question.keys}
+    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
+    return [key for key in others if model_reads(subject.model, config, key)]
+
+
+def fixed_parameters(
+    subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
+) -> Iterator[Fixed]:
+    """Yield each fixed parameter and each other nuisance, if walks can be predicted at changed values."""
     config = subject.config
     forecast = fitted.forecast
     count = len(question.keys)
-    estimated = {parameter_of(key, config).path for key in question.keys}
-    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
-    fixed = [key for key in others if model_reads(subject.model, config, key)]
     sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
     family = ConfigFamily(config, (*question.keys, *fixed))
     wide = replace(
         forecast,
-        walks=step_map_of(subject, family),
+        walks=step_map_of(subject, family, forecast.measured.first_leg),
         admits=family.admits,
         scales=family.scales(),
         nuisances=(*forecast.nuisances, *sensors),
@@ -450,6 +553,7 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
+        # Only the exact differences may be one-sided, where a walk on one side ends early.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:
@@ -525,7 +629,7 @@ def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
 def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) -> dict[str, Uncertain]:
     """Return period, step length and spectral radius of the identified gait, with errors propagated from the estimates.
 
-    Returns nothing if the identified walker has no one-step gait near the fitted start.
+    Returns nothing if the identified walker has no gait near the fitted start.
 
     units  units of the walker, or None to leave out the sensitivity of the gait to a drop of the floor
     """
@@ -536,14 +640,16 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
         if not forecast.admits(parameters):
             return None
         z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
-        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        stride = forecast.walks.stride
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
-        values = (gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max()))
+        radius = float(np.abs(gait.multipliers).max()) ** (1.0 / stride)
+        values = (gait.period_s / stride, math.fsum(gait.lengths_m) / stride, radius)
         if units is None:
             return np.array(values)
-        responses = response(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units), "floor-drop")  # type: ignore[arg-type]
-        return None if responses is None else np.array((*values, responses[0][0]))
+        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))  # type: ignore[arg-type]
+        return None if norms is None else np.array((*values, norms[0]))
 
     centre = quantities(0.0 * fitted.u)
     if centre is None:
@@ -551,7 +657,7 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
     slopes = np.zeros((forecast.scales.size, centre.size))
     names = GAIT_NAMES[: centre.size]
     for index, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
-        # for measured steps, the derivatives of the walk take the same step, so these walkers are cached
+        # The derivatives of measured steps use the same differences, so these walkers are already cached.
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}

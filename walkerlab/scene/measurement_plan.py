@@ -96,6 +96,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     """
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
+    # One step more than is measured: samples must lie before the last heel strike of a walk.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
@@ -107,8 +108,9 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
     times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
     angles = walks.sample_legs(subject.z, family.start, level, times)  # type: ignore[arg-type]
-    of_steps = MeasuredWalk(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
-    return of_steps, split_into_steps(times, angles, touches)
+    quantities = walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps]
+    of_steps = MeasuredWalk(*quantities, first_leg=subject.first_leg)
+    return of_steps, replace(split_into_steps(times, angles, touches), first_leg=subject.first_leg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
     """
     problem = problem_of(subject, measured, question)
     if measured.sampled:
+        # `identify` always fits a delay to angles at their sample times.
         nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
@@ -143,7 +146,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain after measuring these quantities of the first steps, and what stays open."""
+    """Return the errors that remain after measuring these quantities of the first steps, and the open combinations."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
     data = walk.data
     quantities = walk.forecast.quantities
@@ -166,7 +169,8 @@ def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], mo
 
     if not suffices(most):
         return None
-    low, high = 0, most  # more steps never increase an error
+    # More steps never increase an error.
+    low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if suffices(middle) else (middle, high)

@@ -39,7 +39,7 @@ def rigid_walk_omissions(config: SimulateConfig) -> tuple[Entry, ...]:
 
 
 def stance_omission(config: RigidConfig) -> Entry:
-    """Describe the omission at the stance foot of the rigid model: a compass pivots on a point, others may roll."""
+    """Describe what the rigid model omits at the stance foot. A compass pivots on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return omission(
             "floating base, stance contact and foot radius of the rigid walk",
@@ -62,9 +62,9 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
     if contact is not None and contact.stance == "pinned":
         angles = count_step_angles(config.walker)
         what = "floating base and stance contact in the first step"
-        why = "contact.stance is pinned"
+        reason = "contact.stance is pinned"
         saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
-        omissions.append(omission(what, f"{why}: {angles} angles suffice", saved))
+        omissions.append(omission(what, f"{reason}: {angles} angles suffice", saved))
     if config.walker.foot_radius_m == 0.0:
         saved = "nothing: zeros cost the same time"
         omissions.append(omission("terms of the foot radius", "walker.foot_radius_m is 0", saved))
@@ -88,8 +88,8 @@ def output_omissions(outputs: tuple[Output, ...], model: str, numbers: Mapping[O
     for output, count in numbers.items():
         if output not in outputs:
             what = f"{output} of the {model} walk in time"
-            why = f"{output} are not in `outputs`"
-            yield omission(what, why, f"{count} of {sum(numbers.values())} values per sample")
+            reason = f"{output} are not in `outputs`"
+            yield omission(what, reason, f"{count} of {sum(numbers.values())} values per sample")
     if not outputs:
         yield omission(f"samples of the {model} walk", "`outputs` is empty", "all states during steps")
 

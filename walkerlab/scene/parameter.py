@@ -58,6 +58,7 @@ class Parameter:
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
+            # The schema's limits are in radians.
             if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
@@ -91,6 +92,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
+            # A second leg like the first has no block of its own yet.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
@@ -101,15 +103,27 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
+    """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
     value = value_at(config, path)
-    return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
+    return value_at(config, first_leg_path(path)) if value is None else value
+
+
+def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the path of leg 1's key for that of a key of leg 2, or the path itself for other keys."""
+    return tuple(name for name in path if name != SECOND_LEG)
+
+
+def mass_of_second_leg(config: ContactConfig) -> str | None:
+    """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
+    paths = (path for path, _ in leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg"))
+    return next(map(".".join, paths), None)
 
 
 def _keys_set(value: Any) -> Any:
     if not isinstance(value, Block):
         return value
     keys = value.model_dump(exclude_unset=True)
+    # The type is needed even where it is a default, because it decides which keys a block has.
     return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
@@ -119,20 +133,18 @@ def dotted(key: Key) -> str:
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter for a config key.
+    """Return the parameter that a config key names.
 
     Raises ConfigError if the key is not a number that a model uses.
     """
     # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    # `identify` does not support legs that differ; all others may vary a key that leg 2 takes from leg 1.
-    left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
-    reason = why_no_parameter(key, config, own, stated_value if left_out else value_at)
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
+    reason = explain_non_parameter(key, config, fields, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
-    unit = annotation_of(own[key], "unit") or "1"
+    unit = annotation_of(fields[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
@@ -141,12 +153,12 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
+    yield from (written.get(key, key) for key in fields if not explain_non_parameter(key, config, fields))
 
 
-def why_no_parameter(
+def explain_non_parameter(
     key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""

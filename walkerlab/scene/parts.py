@@ -10,7 +10,7 @@ from walkerlab.config.walkers import (
     CompassWalker,
     Kneed,
     StraightLegs,
-    second_of,
+    second_leg_of,
     torso_mass,
 )
 from walkerlab.errors import ConfigError
@@ -27,14 +27,14 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     Raises ConfigError for inconsistent parts.
     """
     parts = legs_of(walker, rigid)
-    other = second_of(walker)
+    other = second_leg_of(walker)
     parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
 
 
 def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
-    """Return the parts of a walker without its torso, both legs like leg 1."""
+    """Return the parts of a walker without its torso and with two legs like leg 1."""
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
@@ -48,20 +48,20 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
         shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
         return kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    return own_parts(walker)
+    return described_parts(walker)
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
     """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
-    # On compliant ground, legs that are point masses need a hip mass. Otherwise legs side by side can turn about their
-    # masses and move the massless hip freely, and the forces do not determine the hip's acceleration.
+    # On compliant ground, legs that are point masses need a hip mass. Without one, two legs side by side could turn
+    # about their masses and move the hip freely, so that no force would determine the acceleration of the hip.
     if rigid:
         return walker.hip_mass_kg
     present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
     return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
-def own_parts(walker: AssembledWalker) -> Assembly:
+def described_parts(walker: AssembledWalker) -> Assembly:
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -82,7 +82,7 @@ def drive_parameters(config: RigidConfig) -> dict[str, Any]:
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
     """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
-    knees = (getattr(each, "knee", None) for each in (walker, second_of(walker)))
+    knees = (getattr(each, "knee", None) for each in (walker, second_leg_of(walker)))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second
 

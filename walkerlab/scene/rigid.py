@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Equations, Output
 
 FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level ground
+CACHED_LEVEL_WALKERS = 16  # families over slopes reuse their walkers on level ground
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
         for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
     ]
+    # Equal drives leave equal legs a single model.
     if drives[0] == drives[1]:
         return driven.changed(**drives[0])
     return pair(
@@ -104,16 +105,6 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
 def have_different_legs(config: RigidConfig) -> bool:
     return rigid_walker(config).legs_differ
-
-
-def refuse_different_legs(config: RigidConfig, request: str) -> None:
-    """Raise ConfigError for a request that needs two equal legs, if those of the config's walker differ."""
-    if have_different_legs(config):
-        raise ConfigError(
-            f"{request} needs two equal legs, but those of this walker differ.",
-            "Leave out walker.leg_2, or run `walkerlab report`, which shows the walk of legs that differ.",
-            ("walker",),
-        )
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:

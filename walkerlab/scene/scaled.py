@@ -12,16 +12,16 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
 
-# away from boundaries between outcomes, these tolerances give the same map as the config's (docs/adjustment.md)
+# Except at boundaries between outcomes, these tolerances give the same map as the config's.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
 MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
 
 
-def starts_of(
+def build_scaled_starts(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build starts with scaled velocities from a rigid start. Walks must settle on the contact gait if it is known."""
+    """Build starts with scaled velocities from a rigid start. If the contact gait is known, walks must settle on it."""
     gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
 
     def start(swing: float, stance: float) -> State:
@@ -39,7 +39,7 @@ def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
 
 
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
-    """Return the same starts with the solver settings of a map.
+    """Return the starts with the solver settings of a map.
 
     evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
     """

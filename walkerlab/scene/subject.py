@@ -50,12 +50,20 @@ class ModelUnderTest:
         return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
 
     def quick_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
+        """Return the gait on a map of quick walks, once for each leg that may begin to swing, or only once for equal
+        legs.
+        """
         quick = QUICK_WALKS[self.model]
         return [
             gait._replace(step_map=gait.step_map.replace_tolerances(quick))
             for gait in self.gait_on_map().split_by_leg()
         ]
+
+    @property
+    def first_leg(self) -> int:
+        """Leg (1 or 2) that swings in the first complete step from the gait's section."""
+        # On the contact model's section leg 1 has begun its swing, so the first complete step is that of leg 2.
+        return 1 if self.model == RIGID else 2
 
     @property
     def units(self) -> Units:
@@ -79,7 +87,7 @@ def find_model_gait(
     """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
-    note  receives a message about each difference from the config's scene
+    note  receives a message about each difference from the scene of the config
 
     Raises NoAnswer if it has no gait.
     """
@@ -90,6 +98,7 @@ def find_model_gait(
     # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
+    # The scene's config may hold only the keys that a stage reads; the search copies a complete one.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

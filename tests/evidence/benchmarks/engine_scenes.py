@@ -25,6 +25,20 @@ def limping():
     return supported_scene(config, LIMPING_STEP_LENGTH, LIMPING_GAIT, LIMPING_ASYMMETRY)
 
 
+ONE_KNEE_GROUND = "contact={stiffness: 300000, damping: 270, stiction_velocity: 10, friction_velocity: 100}"
+ONE_KNEE_GAIT = (
+    -0.32894529608999673, 0.24894529608999671, -0.32894529608999673,
+    -0.5742680472677808, -1.1670910305869249, -0.5742680472677808,
+)  # fmt: skip
+
+
+@cache
+def one_knee():
+    """Leg 1 has a knee, leg 2 has none."""
+    config = load(Path("one-knee"), (ONE_KNEE_GROUND,)).config
+    return supported_scene(config, 0.42478605569498096, ONE_KNEE_GAIT, 0.05797768479511639)
+
+
 @cache
 def compass(*sets):
     return supported_scene(load(None, sets).config, STEP_LENGTH, GAIT)

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from engine_scenes import compass, kneed, limping
+from engine_scenes import compass, kneed, limping, one_knee
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
@@ -92,17 +92,17 @@ def test_mujoco_gives_both_feet_of_a_kneed_walker_the_same_spring(locked):
     assert model.pair_solref[pairs] / scales == pytest.approx(np.array(expected), rel=1e-9)
 
 
-def test_knee_locks_in_an_engine_as_in_walkerlab(engine):
+@pytest.mark.parametrize(("walker", "until"), [(kneed, 0.4), (one_knee, 0.6)])
+def test_knee_locks_in_an_engine_as_in_walkerlab(engine, walker, until):
     """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
-    scene = kneed()
-    until = 0.4
+    scene = walker()
     truth = simulate(scene, "radau5", 1e-10, 1, until)
     name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
     stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
     answer = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run()
     assert answer.outcome == "walked"
     assert truth.knee_strike_time_s[0] < until < truth.touch_time_s[0]
-    shank, thigh = (scene.assembly.index(body) for body in ("shank 1", "thigh 1"))
+    shank, thigh = (scene.assembly.index(body) for body in scene.assembly.legs[0][::-1])
     assert answer.end[2 + shank] == answer.end[2 + thigh]
     assert answer.end == pytest.approx(truth.samples.states[1], abs=2e-5)
 

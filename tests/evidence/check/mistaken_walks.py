@@ -20,16 +20,16 @@ from walkerlab.scene.rigid import rigid_walker
 UNITS = np.eye(4)
 FALLEN = 1.2  # rad, of the stance leg
 STRIKE_MISTAKES = {
-    "also subtracts the leg's inertia I times the rate between the legs": {"extra": (1.0, -1.0)},
-    "also subtracts the leg's inertia I times the trailing leg's rate": {"extra": (1.0, 0.0)},
+    "−I × (trailing leg's rate − leading leg's rate)": {"extra": (1.0, -1.0)},
+    "−I × the trailing leg's rate": {"extra": (1.0, 0.0)},
     "trailing leg keeps its rate": {"keeps_rate": True},
     "leaves out the foot's rolling": {"strike_radius": 0.0},
-    "inertia is left out of the strike": {"strike_inertia": 0.0},
+    "inertia is left out of the heel strike": {"strike_inertia": 0.0},
     "the legs' inertia is left out": {"inertia": 0.0},
     "hip's mass counts once for each leg": {"hip": 2.0},
 }
 SIZED_MISTAKES = {
-    "is within 0.001 rad of a touch": {"window": 1e-3},
+    "is within 0.001 rad of it": {"window": 1e-3},
     "Euler's method with a step of 0.002 s": {"euler": 2e-3},
 }
 MISTAKES = {

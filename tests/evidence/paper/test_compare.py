@@ -124,7 +124,7 @@ def test_summary_has_the_documented_keys(compared):
     json.dumps(summary, allow_nan=False)
 
 
-def test_table_3_contains_the_walks(compared, study):
+def test_table_3_has_the_values_of_both_models_and_the_paper(compared, study):
     table = compared().summary["table3"]
     assert table["t_left"]["as_printed"] == pytest.approx(study.as_printed.table_3.t_left, rel=1e-9)
     assert table["t_cycle"]["corrected"] == pytest.approx(2 * study.corrected.table_3.t_left, rel=1e-9)

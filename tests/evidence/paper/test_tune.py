@@ -64,7 +64,7 @@ def test_work_per_step_equals_the_losses():
     assert "their interaction, including that with the push-off's duration" in told
 
 
-def test_start_of_the_paper_does_not_walk_and_the_reason_is_stated():
+def test_start_of_the_paper_does_not_lead_to_walking_and_the_reason_is_stated():
     start = small("paper").summary["paper_start"]
     assert start["outcome"] != "walked"
     assert start["energy_J"] == pytest.approx(221.5, abs=0.5)
@@ -129,7 +129,7 @@ def test_missing_walking_start_is_explained(sets):
     assert "no_answer" not in content.summary
 
 
-def test_page_says_that_no_start_walks():
+def test_page_says_that_no_start_leads_to_walking():
     results = Results(None, {"tune": small("paper", *NO_FRICTION)})
     (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Statements)]
     (told,) = found.items
@@ -140,7 +140,7 @@ def test_page_says_that_no_start_walks():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_for_a_missing_gait_have_no_answer():
+def test_pads_that_need_a_missing_gait_give_no_answer():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 

@@ -10,14 +10,14 @@ PAPER = next(case for case in package_cases() if case.name == "paper")
 ARRIVAL = Arrival("c", 1.0, np.zeros(8), np.ones(8))
 
 
-def test_ordinary_methods_on_the_paper_walker():
+def test_scipy_radau_solves_the_papers_walk_and_euler_does_not():
     found = {choice.method: choice for choice in choices(PAPER, config_of(PAPER))}
     assert found["SciPy Radau"].verdict == "fine"
     assert found["semi-implicit Euler, 0.001 s"].verdict != "fine"
     assert all(choice.rhs_evaluations <= MAX_ORDINARY_EVALUATIONS for choice in found.values())
 
 
-def test_ordinary_methods_on_the_rigid_walker():
+def test_ordinary_methods_solve_the_rigid_walk():
     case = next(case for case in package_cases() if case.name == "rigid-single-stride")
     found = choices(case, config_of(case))
     assert [choice.method for choice in found] == ["SciPy RK45", "SciPy LSODA", "SciPy Radau"]

@@ -43,20 +43,20 @@ def test_failure_of_all_second_methods_is_reported():
     assert second.tried == "dop853 budget-exhausted, scipy-bdf budget-exhausted, scipy-radau solver-failed"
 
 
-def test_multistep_method_walks_on_stiff_ground():
+def test_multistep_method_simulates_a_walk_on_stiff_ground():
     result = judge(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
     assert result.ok
     assert (result.second_method, result.second_tried) == ("scipy-bdf", "dop853 budget-exhausted")
     assert any("from the walk with scipy-bdf" in finding.measure for finding in result.findings)
 
 
-def test_multistep_method_walks_the_rigid_model():
+def test_multistep_method_simulates_the_rigid_model():
     result = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
     (finding,) = [finding for finding in result.findings if "from the walk with radau5" in finding.measure]
     assert 0.0 < finding.value < finding.limit < 1e-6
 
 
-def test_case_without_an_answer_is_not_compared_with_a_reason():
+def test_case_without_an_answer_states_why_it_was_not_compared():
     case = CASES["no-budget"]
     result = judge(case, config_of(case))
     assert (result.second_method, result.second_tried) == ("", "the walk itself ended as budget-exhausted")

@@ -90,7 +90,7 @@ def test_levers_of_merged_bodies_are_summed():
     np.testing.assert_allclose(straight.foot_x[0, :3], expected, rtol=1e-14)
 
 
-def test_form_of_a_whole_walker_has_no_weight():
+def test_equations_of_a_free_walker_have_no_weight_term():
     assert not hasattr(walker_of(LEGS).whole, "weight")
 
 

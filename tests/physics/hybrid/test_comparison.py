@@ -99,7 +99,7 @@ def test_only_steps_that_both_completed_are_compared():
     assert difference_in_phase(walk(steps=4), walk(), PHASES).angle.shape == (4, PHASES.size, 2)
 
 
-def test_short_walks_have_no_phase_difference_or_orbit():
+def test_phase_and_orbit_comparisons_reject_walks_without_a_full_step_or_stride():
     plain = walk()
     cut = Motion(plain.time[:50], plain.angle[:50], plain.velocity[:50], plain.step_ends[:0])
     with pytest.raises(ValueError, match="no step"):

@@ -128,7 +128,7 @@ def test_walk_ends_when_its_stance_foot_lands_too_far_away(tolerance):
     assert height == pytest.approx(0.0, abs=1e-11)
 
 
-def test_nearly_rigid_contact_walks_almost_the_rigid_gait():
+def test_nearly_rigid_contact_gives_almost_the_rigid_gait():
     """Stiffness and damping 10^4 times, stiction at 0.1 mm/s, and a point foot, as the rigid model has it."""
     walk = walked(*NEAR_RIGID, "walker.foot_radius_m=0")
     assert walk.outcome is Outcome.WALKED
@@ -137,7 +137,7 @@ def test_nearly_rigid_contact_walks_almost_the_rigid_gait():
 
 
 @pytest.mark.parametrize("slope", ["slope_deg=1", "slope_rad=0.01755"])
-def test_adams_start_of_table_2_does_not_walk(slope):
+def test_adams_start_of_table_2_does_not_lead_to_walking(slope):
     walk = walked(slope, start=(-0.2021, 0.1670, -1.02, -3.20))
     assert walk.outcome in (Outcome.LIFTED_OFF, Outcome.OFF_PAD, Outcome.FELL)
     assert walk.periods_s.size == 0
@@ -202,7 +202,7 @@ def test_single_support_agrees_with_scipy_radau():
     np.testing.assert_allclose(samples.states[chosen][-1], peer.y[:, -1], atol=1e-7)
 
 
-def test_scipy_radau_walks_the_same_steps():
+def test_scipy_radau_gives_the_same_steps():
     peer, own = walked(method="scipy-radau", steps=3), walked(steps=3)
     assert peer.outcome is own.outcome is Outcome.WALKED
     np.testing.assert_allclose(peer.touch_time_s, own.touch_time_s, atol=1e-6)

@@ -60,7 +60,7 @@ def plain(release_at_touch=False):
     )  # fmt: skip
 
 
-def test_release_by_compression_walks_twenty_steps_near_the_rigid_gait():
+def test_release_by_compression_allows_twenty_steps_near_the_rigid_gait():
     walk = walked(steps=20)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=0.01)

@@ -50,7 +50,7 @@ class Feet:
 
 
 @pytest.mark.parametrize("carried", [False, True])
-def test_foot_in_the_air_has_ground_while_it_is_ahead(carried):
+def test_foot_in_the_air_is_supported_only_while_it_is_ahead(carried):
     assert Feet("after-mid-swing", AIR).passing(FORWARD, carried).carried
     assert not Feet("after-mid-swing", AIR).passing(BACK, carried).carried
 

@@ -45,7 +45,7 @@ def test_walks_over_random_heights_agree_with_an_independent_integration(campaig
 
 
 @pytest.mark.parametrize("seed", [6, 25])
-def test_walks_passing_with_a_foot_in_uneven_ground_agree_with_an_independent_integration(campaign, seed):
+def test_walks_whose_feet_pass_in_uneven_ground_agree_with_an_independent_integration(campaign, seed):
     """The first was once said to stub its foot, and the second lost the ground under a loaded one."""
     assert campaign.compare(campaign.passing(seed), steps=1).wrong == []
 

@@ -431,7 +431,7 @@ def test_start_near_a_known_gait_is_not_followed_further():
     np.testing.assert_array_equal(starts, before)
 
 
-def test_start_that_falls_or_stops_leads_to_no_gait():
+def test_search_from_a_start_that_falls_or_stops_finds_no_gait():
     together = -PAPER.slope + 1e-4
     assert led(shooting(PAPER), PAPER, np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NO_GAIT, NO_GAIT]
 

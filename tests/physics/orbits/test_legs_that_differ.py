@@ -36,7 +36,7 @@ def best(walker):
 
 
 @pytest.mark.parametrize(("kind", "seed"), [*((kind, 1) for kind in KINDS), ("round", 2), ("one knee", 2)])
-def test_a_gait_returns_after_a_stride_of_plain_integration(kind, seed):
+def test_gait_of_unequal_legs_repeats_after_a_stride_of_plain_integration(kind, seed):
     plain = draw_walker(kind, seed)
     gait = best(model_of(plain))
     steps, end = plain.stride(gait.state)
@@ -45,7 +45,7 @@ def test_a_gait_returns_after_a_stride_of_plain_integration(kind, seed):
 
 
 @pytest.mark.parametrize("kind", ["masses", "round", "kneed"])
-def test_a_gait_whose_legs_push_off_differently_returns_after_a_stride(kind):
+def test_gait_with_different_push_offs_repeats_after_a_stride(kind):
     plain = draw_walker(kind, 9)
     strength = 0.004 * sum(segment.mass for leg in plain.legs for segment in leg.segments)
     plain = replace(plain, push_offs=(strength, 1.5 * strength))
@@ -56,7 +56,7 @@ def test_a_gait_whose_legs_push_off_differently_returns_after_a_stride(kind):
     assert gait.work["push_off"] > 0.0
 
 
-def test_multipliers_of_a_stride_are_those_of_differences_by_plain_integration():
+def test_stride_multipliers_equal_differences_of_plain_integrations():
     plain = draw_walker("straight", 1)
     walker = model_of(plain)
     gait = best(walker)
@@ -114,7 +114,7 @@ def test_energy_is_balanced_over_the_steps_of_both_legs(kind):
     assert spent != pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_damped_knee_takes_work_that_the_hip_does_not():
+def test_work_of_a_knee_damper_is_not_assigned_to_the_hip():
     walker = model_of(draw_walker("one knee", 6))
     gait = best(walker)
     assert gait.work["hip"] == 0.0
@@ -160,7 +160,7 @@ def gait_on_map(walker):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
+def test_disturbed_steps_of_each_leg_equal_a_plain_integration(kind):
     plain = draw_walker(kind, 8)
     for gait in gait_on_map(model_of(plain)).split_by_leg():
         model = model_of(plain) if gait.leg == 1 else model_of(plain).exchanged
@@ -174,7 +174,7 @@ def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
 
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize(("kind", "seed"), [("masses", 1), ("round", 1), ("kneed", 1), ("one knee", 2)])
-def test_each_legs_sensitivity_norm_equals_a_brute_force_sum(kind, seed, disturbance):
+def test_sensitivity_norm_of_each_leg_equals_a_brute_force_sum(kind, seed, disturbance):
     for gait in gait_on_map(model_of(draw_walker(kind, seed))).split_by_leg():
         unit = gait.unit_of(disturbance)
         walks = {k: walk_disturbed(gait, disturbance, k * 1e-5 * unit, 90) for k in (-2, -1, 1, 2)}
@@ -205,7 +205,7 @@ def test_exchanging_the_legs_exchanges_their_robustness(kind):
 
 
 @pytest.mark.parametrize("kind", ["masses", "round", "one knee"])
-def test_gradients_of_a_limping_gait_are_those_of_its_neighbours(kind):
+def test_gradients_of_a_limping_gait_equal_differences_of_neighbouring_gaits(kind):
     walker = model_of(draw_walker(kind, 1))
     gait = gait_on_map(walker)
     quantities = ("spectral_radius", "cost_of_transport", "gait_sensitivity_norm")

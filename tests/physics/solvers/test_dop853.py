@@ -51,7 +51,7 @@ def test_number_of_trees_agrees_with_cayley():
     assert [len(rooted_trees.trees(order)) for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
 
 
-def test_stages_are_consistent():
+def test_tableau_nodes_equal_the_row_sums_of_their_stages():
     assert A.sum(axis=1) == pytest.approx(C, abs=1e-14)
     extra = [sum(getattr(tableau, f"A_{s}")) for s in (14, 15, 16)]
     assert extra == pytest.approx(tableau.NODES[13:16], abs=1e-14)

@@ -126,7 +126,7 @@ def orders(errors):
 SMOOTH = Planar(VAN_DER_POL, 1.0, 0.0, 1.0)
 
 
-def test_order_five_on_a_smooth_nonlinear_problem():
+def test_method_has_order_five_on_a_smooth_nonlinear_problem():
     start = (2.0, 0.0)
     exact = solve_ivp(lambda _, y: rate_of(SMOOTH, y), (0.0, 1.5), start, method="DOP853", rtol=1e-13, atol=1e-14).y[
         :, -1

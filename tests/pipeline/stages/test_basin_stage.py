@@ -87,7 +87,7 @@ def test_edge_cells_store_the_share_of_subcells_that_walk(whole):
     assert (cells["walking"][between] * 9).round(9).tolist() == (cells["walking"][between] * 9).round().tolist()
 
 
-def test_walking_share_of_a_cell_is_that_of_a_finer_grid(tmp_path, whole):
+def test_walking_share_of_a_refined_cell_equals_a_finer_grid(tmp_path, whole):
     finer = run(tmp_path, *SMALL[1:3], "basin.cells=[48,36]", "basin.refine=1")
     shares = whole.groups["basin"]["walking"].ravel()
     between = (shares > 0.0) & (shares < 1.0)
@@ -193,7 +193,7 @@ def test_no_stage_needs_the_basin_and_drawings_use_it_if_current():
 NEARLY_EQUAL = "walker.leg_2={leg_mass_kg: 5.000001}"
 
 
-def test_basin_of_nearly_equal_legs_is_that_of_equal_legs(whole, tmp_path):
+def test_basin_of_nearly_equal_legs_equals_that_of_equal_legs(whole, tmp_path):
     content = run(tmp_path, *SMALL, NEARLY_EQUAL)
     (row,), (equal,) = content.summary["attractors"], whole.summary["attractors"]
     assert (row["period"], equal["period"]) == (2, 1)

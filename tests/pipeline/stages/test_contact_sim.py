@@ -15,7 +15,7 @@ from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWor
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
-from walkerlab.pipeline.stages.walk import numbers_of, step_columns
+from walkerlab.pipeline.stages.walk import step_columns, summarise_walk
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content
@@ -189,7 +189,7 @@ def test_step_without_a_knee_strike_has_a_missing_strike_time():
     times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])
     nothing = DrivenWork(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     walk = WalkRecord(Outcome.WALKED, times, along, strikes, 1.4, WalkWork(0, 0, 0, 0), None, nothing)
-    assert numbers_of(walk)["knee_strike_times_s"] == [0.5, None]
+    assert summarise_walk(walk)["knee_strike_times_s"] == [0.5, None]
     assert walk.knee_strikes_s.tolist() == [0.5]
 
 

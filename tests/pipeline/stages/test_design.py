@@ -238,7 +238,7 @@ def test_loss_of_robustness_at_the_optimum_is_reported():
     assert "largest_step_up_m 0.0114 0.0073" in said
 
 
-def test_mass_of_one_leg_is_found_from_equal_legs_and_without_a_block():
+def test_design_of_the_mass_of_one_leg_can_start_from_equal_legs():
     """The longest mean step on a grid of 17 walkers, whose legs are equal in the middle."""
     key = "walker.leg_2.leg_mass_kg"
     found = run("slope-3deg", "design.maximise=period_s", f"design.over={{{key}: [4.8, 5.2]}}", "design.starts=1")

@@ -57,7 +57,7 @@ def test_main_equations_are_those_of_the_config(paper):
     assert [round(value, 4) for value in printed["state"][:2]] == [-0.2022, 0.1674]
 
 
-def test_residual_and_shapes_of_the_summary(paper):
+def test_summary_has_a_small_residual_and_arrays_of_the_right_shape(paper):
     summary = paper.summary
     assert summary["residual"] <= 1e-11
     assert len(summary["state"]) == 4

@@ -7,11 +7,13 @@ import math
 import os
 import random
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import walkerlab
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
@@ -435,3 +437,29 @@ def test_three_hundred_damaged_files_are_read_or_rejected(tmp_path):
         assert np.isfinite(read.summary["step_lengths_m"]).all()
     assert 200 < len(refusals) < 295
     assert set(refusals) == {(True, True)}
+
+
+LIMPING = {
+    "a prosthesis": ("prosthesis",),
+    "a longer leg": ("round-feet", "walker.leg_2={leg_length_m: 0.4005, foot_radius_m: 0.102}"),
+}
+
+
+@pytest.mark.parametrize("begins", ["at the first step", "in the first step"])
+@pytest.mark.parametrize("name", LIMPING)
+def test_recording_of_legs_that_differ_begins_with_leg_1_and_has_the_same_steps(name, begins, tmp_path):
+    own, *sets = LIMPING[name]
+    config = load(Path(own), (*sets, "strides=4")).config
+    walk = run_in_memory("simulate", config)
+    head, *lines = table(walk).splitlines()
+    first = 0 if begins == "at the first step" else 2
+    late = [line for line in lines if not first or float(line.split(",")[0]) > 0.2]
+    path = written(tmp_path, "\n".join([head, *late]))
+    read = run_in_memory("recorded-walk", load(Path(own), (*sets, f"recording={{file: {path}}}")).config)
+    periods, lengths = (read.summary[f"step_{quantity}"] for quantity in ("periods_s", "lengths_m"))
+    assert len(periods) >= 5
+    assert not read.summary["legs_swapped"]
+    assert read.summary["doubts"] == []
+    assert periods == pytest.approx(walk.summary["step_periods_s"][first : first + len(periods)], abs=2e-6)
+    assert lengths == pytest.approx(walk.summary["step_lengths_m"][first : first + len(periods)], abs=2e-6)
+    assert abs(periods[1] - periods[0]) > 0.01

@@ -204,7 +204,7 @@ def test_exhausted_budget_gives_no_answer_but_keeps_the_partial_walk(monkeypatch
     assert caught.value.partial.summary["steps"] > 0
 
 
-def test_other_method_walks_the_same_steps(paper):
+def test_other_method_gives_the_same_steps(paper):
     other = run(solver={"rigid": {"method": "scipy-dop853", "rtol": 1e-10, "atol": 1e-12}})
     assert other.summary["final_state"] == pytest.approx(paper.summary["final_state"], abs=1e-8)
 

@@ -76,7 +76,7 @@ def test_variables_on_disk_are_read_as_they_were_written(stored, texts):
         assert group[name].tolist() == variable.values.tolist()
 
 
-def test_members_and_attributes_are_tracked_in_order_of_creation(stored):
+def test_creation_order_of_members_and_attributes_is_tracked(stored):
     tracked = h5py.h5p.CRT_ORDER_TRACKED | h5py.h5p.CRT_ORDER_INDEXED
     with h5py.File(stored) as file:
         for group in (file["/"], file["walk"]):

@@ -103,7 +103,7 @@ def test_invalid_sweeps_are_rejected_with_the_allowed_values(over, said):
         question(over)
 
 
-def test_missing_repeated_parameters_and_unknown_samplers_are_rejected():
+def test_missing_or_repeated_parameters_and_unknown_samplers_are_rejected():
     with pytest.raises(ConfigError, match="no parameter"):
         question()
     with pytest.raises(ConfigError, match="given twice"):

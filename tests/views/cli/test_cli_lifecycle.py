@@ -21,7 +21,7 @@ def test_config_written_by_init_loads_and_names_its_schema(walker):
     assert "walkerlab report -c 'my walker.yaml'" in done.stdout
     text = (walker.folder / "my walker.yaml").read_text()
     assert text.startswith("# yaml-language-server: $schema=.walkerlab-schema.json\n")
-    assert "# L, from foot to hip: number, from 0.001 to 1000 (m)\n  leg_length_m: 1.0\n" in text
+    assert "# leg length L, from foot to hip: number, from 0.001 to 1000 (m)\n  leg_length_m: 1.0\n" in text
     assert "slope_rad" in json.loads((walker.folder / ".walkerlab-schema.json").read_text())["properties"]
     assert (
         load(walker.folder / "my walker.yaml").config.model_dump()

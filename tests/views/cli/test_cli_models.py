@@ -67,7 +67,7 @@ def test_model_that_cannot_be_written_gives_one_message(walker, arguments, messa
     assert not [path for path in walker.folder.iterdir() if path.suffix.removeprefix(".") in ENDINGS]
 
 
-def test_walker_without_a_gait_has_no_model(tmp_path, monkeypatch):
+def test_walker_without_a_gait_is_not_exported(tmp_path, monkeypatch):
     answer = NoAnswer("no gait", "advice")
     monkeypatch.setattr(models, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
     with pytest.raises(NoAnswer):

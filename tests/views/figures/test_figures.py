@@ -156,7 +156,7 @@ assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens wind
 """
 
 
-def test_equal_results_give_equal_bytes_in_any_process_and_matplotlib_style(tmp_path):
+def test_equal_results_give_equal_bytes_in_any_process_and_style(tmp_path):
     (tmp_path / "matplotlibrc").write_text(OWN_SETTINGS)
     here, package = Path(__file__).parent, Path(__file__).parents[3]
     environment = {
@@ -312,7 +312,7 @@ def with_peak(result):
 
 
 def test_cycle_ends_with_its_second_step():
-    sticks = stick_diagram.sticks_of(rigid_alone()["simulate"])
+    sticks = stick_diagram.read_sticks(rigid_alone()["simulate"])
     at_strikes, between = sticks.postures()
     np.testing.assert_allclose(sticks.time[at_strikes], [0.0, 0.7, 1.4], atol=1e-12)
     assert sticks.time[between].max() < 1.4

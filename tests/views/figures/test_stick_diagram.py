@@ -15,8 +15,8 @@ from walkerlab.views.figures.stick_diagram import (
     entries,
     film_times,
     pictures,
+    read_sticks,
     stick_diagram,
-    sticks_of,
 )
 from walkerlab.views.figures.style import LEGS, VERMILLION
 
@@ -25,7 +25,7 @@ ROUNDING = 1e-12
 
 @pytest.fixture(params=["simulate", "contact-sim"])
 def sticks(request):
-    return sticks_of(both_models()[request.param])
+    return read_sticks(both_models()[request.param])
 
 
 def test_drawn_legs_keep_their_length(sticks):
@@ -48,7 +48,7 @@ def test_feet_land_one_step_length_ahead(sticks):
 
 
 def test_plane_descends_in_walking_direction():
-    sticks = sticks_of(rigid_alone()["simulate"])
+    sticks = read_sticks(rigid_alone()["simulate"])
     x, y = sticks.project(np.array([STEP_LENGTH, 0.0]))
     assert np.arctan2(-y, x) == pytest.approx(SLOPE)
     assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
@@ -56,7 +56,7 @@ def test_plane_descends_in_walking_direction():
 
 def test_incomplete_cycle_is_drawn_to_its_end():
     results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
-    sticks = sticks_of(results["simulate"])
+    sticks = read_sticks(results["simulate"])
     at_strikes, between = sticks.postures()
     assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
     assert sticks.time[between].max() == sticks.time[-1]
@@ -64,7 +64,7 @@ def test_incomplete_cycle_is_drawn_to_its_end():
 
 
 def test_slope_label_is_above_the_named_torso():
-    bare = sticks_of(rigid_alone()["simulate"])
+    bare = read_sticks(rigid_alone()["simulate"])
     sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
     with figure_style():
         figure, axes = stick_diagram(sticks)
@@ -88,7 +88,7 @@ def test_lengths_are_drawn_to_scale():
 
 def test_both_legs_of_every_posture_have_their_colours():
     axes = drawn(FIGURE_2, rigid_alone())
-    at_strikes, between = sticks_of(rigid_alone()["simulate"]).postures()
+    at_strikes, between = read_sticks(rigid_alone()["simulate"]).postures()
     for look in LEGS:
         assert sum(line.get_color() == look.colour for line in axes.lines) == at_strikes.size + between.size
 
@@ -124,7 +124,7 @@ def coloured(picture, look):
 
 
 def film_frame(result, pads=None, **changed):
-    (picture,) = pictures(replace(sticks_of(result), **changed), np.array([0.3]), pads)
+    (picture,) = pictures(replace(read_sticks(result), **changed), np.array([0.3]), pads)
     return picture
 
 
@@ -143,7 +143,7 @@ def test_film_of_a_walk_on_pads_shows_pads_instead_of_a_plane():
 
 def test_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
     walks = both_models()
-    contact_sticks, rigid_sticks = sticks_of(walks["contact-sim"]), sticks_of(walks["simulate"])
+    contact_sticks, rigid_sticks = read_sticks(walks["contact-sim"]), read_sticks(walks["simulate"])
     (alone,) = pictures(contact_sticks, np.array([0.3]))
     (both,) = pictures(contact_sticks, np.array([0.3]), None, rigid_sticks)
     for look in LEGS:
@@ -156,7 +156,7 @@ def test_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
 
 
 def test_film_holds_the_fall_for_a_second():
-    walk = sticks_of(contact(1, outcome="fell"))
+    walk = read_sticks(contact(1, outcome="fell"))
     late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on
     times = film_times(late, None, 25, 1.0)
     assert times[-25:].tolist() == [late.time[-1]] * 25
@@ -169,7 +169,7 @@ def test_film_holds_the_fall_for_a_second():
 @pytest.mark.parametrize("landings", [1, 4, 5, 10])
 def test_film_of_a_fall_shows_the_last_four_steps(landings):
     period = 0.5
-    walk = replace(sticks_of(rigid(landings + 1, period, completed=landings)), ending="fell")
+    walk = replace(read_sticks(rigid(landings + 1, period, completed=landings)), ending="fell")
     times = film_times(walk, None, 25, 1.0)
     assert times[0] == pytest.approx(period * max(0, landings - 4))
     assert times[-1] == walk.time[-1] > period * landings
@@ -178,7 +178,7 @@ def test_film_of_a_fall_shows_the_last_four_steps(landings):
 def test_walk_that_falls_in_its_first_step_has_a_film():
     fall = rigid(1, outcome="fell", completed=0)
     assert FILM_NEEDS["simulate"].missing_in({"simulate": fall}, {}) is None
-    walk = sticks_of(fall)
+    walk = read_sticks(fall)
     times = film_times(walk, None, 25, 1.0)
     assert (times[0], times[-1]) == (0.0, walk.time[-1])
     assert len([*pictures(walk, times[-1:])]) == 1
@@ -194,7 +194,7 @@ def test_film_also_shows_rough_ground_exaggerated():
 
 
 def test_trailing_leg_pushes_off_just_after_each_landing():
-    driven = replace(sticks_of(both_models()["simulate"]), pushes=True)
+    driven = replace(read_sticks(both_models()["simulate"]), pushes=True)
     for strike in driven.strikes[:-1]:
         behind = driven.feet[np.searchsorted(driven.time, strike), :, 0].argmin()
         assert [driven.pushing(strike + late) for late in (0.0, 0.05, 0.2)] == [behind, behind, None]
@@ -203,7 +203,7 @@ def test_trailing_leg_pushes_off_just_after_each_landing():
 
 
 def test_film_shows_the_push_off():
-    walk = sticks_of(both_models()["simulate"])
+    walk = read_sticks(both_models()["simulate"])
     at = np.array([walk.strikes[0] + 0.02])
     (still,), (pushed,) = (list(pictures(replace(walk, pushes=pushes), at)) for pushes in (False, True))
     changed = np.any(still != pushed, axis=2)

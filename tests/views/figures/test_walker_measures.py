@@ -64,7 +64,7 @@ def test_dimension_lines_have_the_labelled_length(walker):
         assert np.abs(gaps - abs(measure.value)).min() < 1e-12
 
 
-def test_user_config_is_drawn_by_its_command(tmp_path, monkeypatch):
+def test_draw_command_draws_a_user_config(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.yaml").write_text("extends: kneed\nname: mine\nwalker: {hip_mass_kg: 0.75}\n")
     path = draw_walker(Path("mine.yaml"), Target(None, None), Console(quiet=True))

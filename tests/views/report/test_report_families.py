@@ -24,7 +24,7 @@ def test_finding_states_the_stable_range_and_paragraph_the_chaos():
     assert [cell.text for cell in next(iter(table.groups.values()))[0]][:4] == ["flip", "rigid", "1", "4"]
 
 
-def test_limits_by_the_ground_are_stated_for_gaits_and_basins():
+def test_answers_state_if_the_ground_limits_gaits_or_basins():
     summary = dict(families()["continuation"].summary)
     told = {"model": "contact", "value": 3.2, "outcome": "off-pad"}
     summary["endings"] = [

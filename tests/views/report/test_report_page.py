@@ -158,7 +158,7 @@ def test_command_lines_and_versions_are_escaped():
     assert len(page.all("script")) == 1
 
 
-def test_any_block_accepts_any_text():
+def test_every_block_of_a_page_escapes_its_texts():
     section = Section(
         "nasty",
         NASTY,

@@ -27,7 +27,7 @@ from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.scene.rigid import rigid_walker
 
 # The sizes of runs below are counted in right-hand sides.
-RUN_BUDGET = 200_000  # limit of a compiled run, which ends hopeless runs
+RUN_BUDGET = 200_000  # limit of a compiled run, so that hopeless runs end
 # A library's right-hand sides take a hundred times as long, because its steps run in Python.
 LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
 LAST_RUN_SIZE = 12_000  # size of a library's run after which its ladder ends
@@ -81,8 +81,8 @@ class MethodRow:
     against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
     within_reference: bool  # whether the error is below the reference's uncertainty
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
-    least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
-    largest_wall_s: Annotated[float, Label("s", "largest run time", timing=True)]
+    least_wall_s: Annotated[float, Label("s", "shortest run time", timing=True)]
+    largest_wall_s: Annotated[float, Label("s", "longest run time", timing=True)]
     repeats_of_wall_s: Annotated[int, Label("1", "timed repeats", timing=True, name="repeats")]
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides")]
     accepted: Annotated[int, Label("1", "accepted steps")]

@@ -85,7 +85,7 @@ def draw_methods(scene: str, results: Results) -> Drawn:
     all_series = list(method_series(scene, results))
     summary = results["accuracy"].summary
     reference = summary["reference"][scene]
-    # difference between the reference and a second one: smaller errors mean nothing
+    # Errors below the difference between the reference and a second one mean nothing.
     floor = max(float(reference["agreement"]), MIN_FLOOR)
     errors = [
         float(np.max(series.runs["error"], where=series.runs["reached"] != 0, initial=floor)) for series in all_series

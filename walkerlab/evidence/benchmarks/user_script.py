@@ -22,7 +22,7 @@ def walk_as_a_script(
     method: str = "DOP853",
     ends: tuple[Any, ...] = (),
 ) -> tuple[Floats | None, int]:
-    """Walk with SciPy's solve_ivp, a NumPy right-hand side and terminal events.
+    """Simulate a walk with SciPy's solve_ivp, a NumPy right-hand side and terminal events.
 
     ends  further event functions that end the walk
 

@@ -1,27 +1,37 @@
 """Search for a cause that reproduces all printed values: other conventions, a known mistake, or a misprint.
 
-Each candidate is a walker. A step from the printed state gives a first guess of its gait. Gaits are solved only for the
-best candidates, and only a gait with every printed digit is an explanation.
+Each candidate is a walker: the plain model with a mistake that is known from publications and programs, or with a
+misprinted parameter. A step from the printed state gives a first guess of its gait. Gaits are solved only for the best
+candidates, and only a gait with every printed digit is an explanation.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from operator import itemgetter
+from itertools import pairwise
+from operator import attrgetter, itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.reads import RigidConfig
-from walkerlab.evidence.check import causes
-from walkerlab.evidence.check.causes import Candidate, MistakeFamily
-from walkerlab.evidence.check.conventions import Convention, alternatives, full_state, start_from
-from walkerlab.evidence.check.gaits import CheckedStep, gait_near
-from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
+from walkerlab.config.fields import replace_key
+from walkerlab.config.numbers import short_number
+from walkerlab.config.reads import RigidConfig, flatten
+from walkerlab.evidence.check.gaits import GRAVITIES, CheckedStep, Convention, alternatives, gait_near
+from walkerlab.evidence.check.plain_walker import (
+    EXACT,
+    QUICK,
+    Floats,
+    Mistake,
+    PlainWalker,
+    list_mistakes,
+    plain_walker,
+)
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
@@ -35,6 +45,67 @@ FEW = 3  # numbers that can be explained while others are not
 MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
 READINGS = 2  # other conventions in which a mistake is searched
 NEARLY = 2.0  # ratio of two distances between which the number of changes decides
+CONVERGED: Final = 1e-6  # relative change of a fitted value
+SLOPE = "slope_rad"
+GRAVITY = "gravity_m_s2"
+FIELDS: Final[Mapping[str, Any]] = {SLOPE: "slope", GRAVITY: "gravity"}
+"""Fields of the plain walker that are keys of the config itself."""
+UNIT = re.compile(r"_(m|kg|kg_m2|rad|m_s2)$")
+
+
+class Candidate(NamedTuple):
+    """A walker that may explain the printed values."""
+
+    kind: str  # mistake or misprint
+    what: str  # ends a sentence that begins with 'All printed values follow if'
+    walker: PlainWalker
+    family: str = ""  # the mistake without its size, if it has one
+
+
+def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
+    """Yield walkers with one parameter changed as a misprint could change it."""
+    values = parameters(config)
+    for key, value in values.items():
+        for other, how in misprinted(key, value, values):
+            walker = walker_with(config, key, other)
+            if walker is not None:
+                yield Candidate("misprint", f"{key} is {short_number(other)} ({how})", walker)
+
+
+def parameters(config: RigidConfig) -> dict[str, float]:
+    """Return the parameters that are not zero, by dotted key."""
+    block = {SLOPE: config.slope_rad, GRAVITY: config.gravity_m_s2, "walker": config.walker.model_dump()}
+    return {key: value for key, value in flatten(block) if isinstance(value, float) and value and UNIT.search(key)}
+
+
+def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | None:
+    """Return the plain walker with another value of one parameter, or None if it cannot be built."""
+    own: dict[str, Any] = {FIELDS[key]: value} if key in FIELDS else {}
+    changed = None if own else replace_key(config.walker, key.removeprefix("walker."), value)
+    walker = replace(plain_walker(config, changed), **own)
+    turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts[: 1 + walker.kneed])
+    return walker if turns and walker.leg_length > walker.radius >= 0.0 < walker.gravity else None
+
+
+def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Return the values for which a value may be a misprint, and how it came about."""
+    unit = UNIT.findall(key)
+    found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
+    found |= dict.fromkeys(transposed(value), "two digits are transposed")
+    found |= {float(f"{value * factor:.12g}"): "a factor of ten" for factor in (0.1, 10.0)}
+    if key == SLOPE:
+        found[math.radians(value)] = "degrees as radians"
+    if key == GRAVITY:
+        found |= dict.fromkeys(GRAVITIES, "another gravity")
+    return [(other, how) for other, how in found.items() if other != value]
+
+
+def transposed(value: float) -> Iterator[float]:
+    """Yield the values that two neighbouring digits exchanged make of a number."""
+    text = short_number(value)
+    for place, (first, second) in enumerate(pairwise(text)):
+        if first.isdigit() and second.isdigit() and first != second:
+            yield float(text[:place] + second + first + text[place + 2 :])
 
 
 @dataclass(frozen=True)
@@ -47,11 +118,8 @@ class Explanation:
     digits: int  # smallest number of digits that agree
 
 
-class Attempt(NamedTuple):
-    """The gait of a walker that may explain the printed values."""
-
-    candidate: Candidate
-    gait: CheckedStep
+Attempt = tuple[Candidate, CheckedStep]
+"""A walker that may explain the printed values, and its gait."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +154,7 @@ class Question:
 
     def explanation(self, kind: str, what: str, items: Sequence[Item] = ()) -> Explanation:
         reproduced = items or self.items
-        return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.digits for each in reproduced))
+        return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.count for each in reproduced))
 
     def reproduced(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> list[Item]:
         """Return the printed numbers of which a gait has every digit."""
@@ -95,22 +163,19 @@ class Question:
 
     def fits(self, walk: CheckedStep, convention: Convention) -> bool:
         """Whether a gait has every printed digit. What needs no derivative is compared first."""
-        return all(
-            len(self.reproduced(walk, items, convention)) == len(items) for items in (self.quick_items, self.items)
-        )
+        return all(self.reproduced(walk, items, convention) == items for items in (self.quick_items, self.items))
 
-    def explained_by(self, attempt: Attempt) -> Explanation | None:
-        """Return what the gait of an attempt explains, or None if it explains too little.
+    def explained_by(self, candidate: Candidate, gait: CheckedStep) -> Explanation | None:
+        """Return what a candidate's gait explains, or None if it explains too little.
 
         The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
         right.
         """
-        if len(self.reproduced(attempt.gait, self.state_items)) < len(self.state_items):
+        if self.reproduced(gait, self.state_items) != self.state_items:
             return None
-        reproduced = self.reproduced(attempt.gait, self.items)
-        if len(reproduced) < min(FEW, len(self.items)):
-            return None
-        return self.explanation(attempt.candidate.kind, attempt.candidate.what, reproduced)
+        reproduced = self.reproduced(gait, self.items)
+        enough = len(reproduced) >= min(FEW, len(self.items))
+        return self.explanation(candidate.kind, candidate.what, reproduced) if enough else None
 
     def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
         """Return the largest distance of a walk from a printed value, in units of its last digit."""
@@ -123,13 +188,13 @@ class Question:
         if walk is None:
             return None
         values = walk.values(self.quick_items, self.convention)
-        known = [(item, values[item.name]) for item in self.quick_items if item.printed.bounds is None]
-        found = [(value.real - item.printed.value.real) / item.unit for item, value in known if value is not None]
+        known = [(values[item.name], item) for item in self.quick_items if item.printed.bounds is None]
+        found = [(value.real - item.value) / item.last_digit for value, item in known if value is not None]
         return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
-        start = self.right.start if self.state is None else start_from(walker, self.state, self.convention.instant)
+        start = self.right.start if self.state is None else walker.start_from(self.state, self.convention.instant)
         step = None if start is None else walker.step(start, tolerance)
         if step is None or start is None or self.right.derivative is None:
             return None
@@ -137,17 +202,15 @@ class Question:
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
         # a value may be printed that the state alone does not determine
-        needs_times = self.convention.instant != "after-strike" or any(
-            item.quantity != "state" for item in self.quick_items
-        )
-        after = walker.step(start + move, tolerance) if needs_times else step
+        quantities = {self.convention.instant, *(item.quantity for item in self.quick_items)}
+        after = step if quantities == {"after-strike", "state"} else walker.step(start + move, tolerance)
         return None if after is None else CheckedStep(walker, start + move, after)
 
-    def attempt(self, candidate: Candidate, guess: CheckedStep) -> Iterator[Attempt]:
+    def attempt(self, candidate: Candidate, guess: CheckedStep | None) -> Iterator[Attempt]:
         """Yield the gait of a candidate near a first guess, if there is one."""
-        gait = gait_near(candidate.walker, guess.start, self.right.derivative)
+        gait = None if guess is None else gait_near(candidate.walker, guess.start, self.right.derivative)
         if gait is not None:
-            yield Attempt(candidate, CheckedStep(candidate.walker, *gait))
+            yield candidate, gait
 
 
 def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | None]:
@@ -177,11 +240,11 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
 def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
     """Yield what the gaits of attempts explain. A mistake that has a size counts once."""
     families: set[str] = set()
-    for attempt in attempts:
-        explanation = None if attempt.candidate.family in families else question.explained_by(attempt)
+    for candidate, gait in attempts:
+        explanation = None if candidate.family in families else question.explained_by(candidate, gait)
         if explanation is not None:
             yield explanation
-            families |= {attempt.candidate.family} - {""}
+            families |= {candidate.family} - {""}
 
 
 def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
@@ -195,12 +258,11 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
         readings.setdefault(question.miss(question.right, question.exact_items, other), other)
     near = NEARLY * min(readings)
     closest = [other for miss, other in readings.items() if miss <= near and miss < far]
-    numbers = [item.printed.value.real for item in question.items if item.quantity == "state"]
-    known = full_state(question.right.start, question.walker.kneed)
+    numbers = [item.value for item in question.items if item.quantity == "state"]
+    known = question.walker.full_state(question.right.start)
     for other in closest[:READINGS]:
         state = other.read(question.walker, numbers, known)
-        changes = join_words([*other.differences(question.convention)])
-        yield changes, replace(question, convention=other, state=state)
+        yield join_words(other.differences(question.convention)), replace(question, convention=other, state=state)
 
 
 def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
@@ -208,55 +270,47 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
     if not question.quick_items:
         return None
     without = question.miss(question.right, question.quick_items)
-    distances = ((question.miss(each.gait, question.quick_items), each) for each in attempts)
-    miss, attempt = min(distances, default=(math.inf, None), key=itemgetter(0))
-    if attempt is None or miss * MUCH_CLOSER > without:
+    misses = ((question.miss(gait, question.quick_items), candidate) for candidate, gait in attempts)
+    miss, candidate = min(misses, default=(math.inf, None), key=itemgetter(0))
+    if candidate is None or miss * MUCH_CLOSER > without:
         return None
-    kind = attempt.candidate.kind
-    what = attempt.candidate.what
-    return {"kind": kind, "what": what, "miss_in_units": miss, "without_in_units": without}
+    return {"kind": candidate.kind, "what": candidate.what, "miss_in_units": miss, "without_in_units": without}
 
 
 def attempts_at(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    for place, candidate in enumerate(
-        (*causes.generate_mistakes(question.walker), *causes.generate_misprints(question.config))
-    ):
+    mistakes = [*list_mistakes(question.walker)]
+    candidates = [Candidate("mistake", each.what, each.of_size(0.0)) for each in mistakes if not each.first]
+    candidates += generate_misprints(question.config)
+    for place, candidate in enumerate(candidates):
         guess = question.guess(candidate.walker)
-        if guess is not None and (right is None or not same(guess, right)):
-            guesses.append((question.miss(guess, question.quick_items), place, candidate, guess))
-    for _, _, candidate, guess in heapq.nsmallest(REFINED, guesses):
-        yield from question.attempt(candidate, guess)
+        if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
+            guesses.append((question.miss(guess, question.quick_items), place, guess))
+    for _, place, guess in heapq.nsmallest(REFINED, guesses):
+        yield from question.attempt(candidates[place], guess)
     if len(question.items) < FEW:
         return
-    for family in causes.generate_families(question.walker):
-        for size in sizes_to_try(fitted_size(question, family)):
-            candidate = Candidate("mistake", family.what.format(f"{size:.4g}"), family.of_size(size), family.what)
-            guess = question.guess(candidate.walker, EXACT)
-            if guess is not None:
-                yield from question.attempt(candidate, guess)
+    for mistake in filter(attrgetter("first"), mistakes):
+        for size in sizes_to_try(question, mistake):
+            candidate = Candidate("mistake", mistake.what.format(f"{size:.4g}"), mistake.of_size(size), mistake.what)
+            yield from question.attempt(candidate, question.guess(candidate.walker, EXACT))
 
 
-def same(walk: CheckedStep, other: CheckedStep) -> bool:
-    return bool(np.abs(walk.start - other.start).max() < SAME_WALK * np.abs(other.start).max())
-
-
-class Fit(NamedTuple):
+class Fitted(NamedTuple):
     """Value of a parameter that brings gaits closest to the printed values."""
 
     value: float
     change: float  # relative change in the last round
-    without: Floats  # distances before the fit, in units of last digits
-    there: Floats  # those at the last value that was tried
-    left: Floats  # those that remain if gaits change in proportion to the parameter
+    without: float  # largest distance before the fit, in units of last digits
+    left: float  # the one that remains if gaits change in proportion to the parameter
 
 
 def fit(
     question: Question, walker_of: Callable[[float], PlainWalker | None], begin: float, near: float,
-    limits: tuple[float, float],
-) -> Fit | None:  # fmt: skip
+    limits: tuple[float, float] = (-math.inf, math.inf),
+) -> Fitted | None:  # fmt: skip
     """Fit a parameter to the printed values by secants from a first value, or return None if that leads nowhere."""
     without = question.misses(walker_of(begin))
     result = None
@@ -269,28 +323,23 @@ def fit(
         value = begin + move
         if not limits[0] <= value <= limits[1]:
             return None
-        result = Fit(value, abs(value / near - 1.0), without, there, without + move * slope)
+        left = float(np.abs(without + move * slope).max())
+        result = Fitted(value, abs(value / near - 1.0), float(np.abs(without).max()), left)
         if result.change < CONVERGED:
             break
         near = value
     return result
 
 
-CONVERGED: Final = 1e-6  # relative change of a fitted value
+def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
+    """Yield round sizes near the one that brings a mistake's gait closest to the printed values, then that one.
 
-
-def fitted_size(question: Question, family: MistakeFamily) -> float | None:
-    """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
-    found = fit(question, family.of_size, 0.0, family.first, family.limits)
-    if found is None or np.abs(found.left).max() * LEAST_GAIN > np.abs(found.without).max():
-        return None
-    return found.value
-
-
-def sizes_to_try(size: float | None) -> Iterator[float]:
-    """Yield round sizes near a fitted one, then the fitted one itself."""
-    if size is None:
+    There are none if it does not come much closer than the right gait.
+    """
+    fitted = fit(question, mistake.of_size, 0.0, mistake.first, mistake.limits)
+    if fitted is None or fitted.left * LEAST_GAIN > fitted.without:
         return
+    size = fitted.value
     power = 10.0 ** math.floor(math.log10(size))
     for digit in (*ROUND_SIZES, 10.0):
         if abs(digit * power / size - 1.0) < SIZE_SHARE:
@@ -304,39 +353,38 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
     if minus_one and len(question.reproduced(question.right, others)) == len(others):
-        what = "the integration starts on the strike's surface and meets it at once, which adds a multiplier of -1"
+        what = "the integration starts at a heel strike, which is found again at once and adds a multiplier of -1"
         yield question.explanation("mistake", what)
 
 
 def conventions(question: Question) -> Iterator[Explanation]:
     """Yield other conventions under which the right gait has every printed digit, those with the fewest changes."""
-    found: list[tuple[int, str]] = []
+    found: dict[str, int] = {}
     for what, walk in scenes(question):
         for other in (question.convention, *alternatives(question.convention)):
             changes = [*([what] if what else []), *other.differences(question.convention)]
-            if not changes or (found and len(changes) > min(found)[0]):
+            if not changes or len(changes) > min(found.values(), default=math.inf):
                 continue
             times = replace(question.convention, time=other.time, steps=other.steps)
             if (question.state_items or other == times) and question.fits(walk, other):
-                found.append((len(changes), join_words(changes)))
-    for changed, what in dict.fromkeys(found):
-        if changed == min(found)[0]:
+                found.setdefault(join_words(changes), len(changes))
+    for what, changed in found.items():
+        if changed == min(found.values()):
             yield question.explanation("convention", what)
 
 
 def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
-    yield from (("", CheckedStep(gait.walker, gait.start, gait.step)) for gait in question.gaits)
+    yield from (("", gait) for gait in question.gaits)
     walker = question.walker
-    printed = None if question.state is None else start_from(walker, question.state, question.convention.instant)
+    printed = None if question.state is None else walker.start_from(question.state, question.convention.instant)
     starts = [start for start in (printed, question.right.start) if start is not None]
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius
         other = replace(walker, foot=foot)
-        gaits = (gait_near(other, start) for start in starts) if foot.imag < 0.0 else iter(())
-        gait = next(filter(None, gaits), None)
-        if gait is not None:
-            yield f"the stated leg length {how} the foot's radius", CheckedStep(other, *gait)
+        gaits = (gait_near(other, start) for start in starts if foot.imag < 0.0)
+        for gait in [*filter(None, gaits)][:1]:
+            yield f"the stated leg length {how} the foot's radius", gait
 
 
 def misprinted_values(question: Question) -> Iterator[Explanation]:
@@ -349,11 +397,11 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
         return
     item = wrong[0]
     name = spell_name(item.name)
-    printed = item.printed.real.value
+    printed = item.value
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
-    elif any(item.fits(right + printed - other) for other in causes.transposed(printed)):
+    elif any(item.fits(right + printed - other) for other in transposed(printed)):
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 
@@ -363,15 +411,15 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
         return []
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
     found: list[dict[str, float | str]] = []
-    for key, value in causes.parameters(question.config).items():
-        walker_of = partial(causes.walker_with, question.config, key)
-        change = fit(states, walker_of, value, value * (1.0 + 1e-4), (-math.inf, math.inf))
-        if change is not None and change.change < CONVERGED and np.abs(change.there).max() <= 1.0:
+    for key, value in parameters(question.config).items():
+        walker_of = partial(walker_with, question.config, key)
+        change = fit(states, walker_of, value, value * (1.0 + 1e-4))
+        if change is not None and change.change < CONVERGED and change.left <= 1.0:
             found.append({"key": key, "value": float(f"{change.value:.6g}")})
     return found
 
 
-def advise_on_ambiguity(explanations: Sequence[Explanation]) -> str:
+def advise(explanations: Sequence[Explanation]) -> str:
     """Return a sentence on how to decide between several explanations, or '' if there is at most one."""
     if len(explanations) < 2:
         return ""

@@ -1,41 +1,63 @@
-"""Plain walkers of configs, their gaits, and the values that may be printed of them."""
+"""Gaits of plain walkers, and their values in the conventions in which they are printed.
+
+A convention has the order and origin of the angles, the instant of the state, and the units.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
+from itertools import permutations, product, starmap
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from walkerlab.config.check import Instant
-from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
-from walkerlab.evidence.check.conventions import Convention, state_at
-from walkerlab.evidence.check.plain_walker import (
-    EXACT,
-    STANCE,
-    STRAIGHT,
-    SWING,
-    Floats,
-    LegPart,
-    PlainStep,
-    PlainWalker,
-)
+from walkerlab.config.check import Check, Instant
+from walkerlab.errors import ConfigError
+from walkerlab.evidence.check.plain_walker import BENT, EXACT, SHANK, STANCE, SWING, Floats, PlainStep, PlainWalker
 from walkerlab.evidence.check.printed import Item, match_multipliers
 
+BODIES: Final = {"swing": SWING, "stance": STANCE, "shank": SHANK}
+DEFAULT_ORDERS: Final = {2: ("stance",), 4: ("swing", "stance"), 6: ("swing", "stance", "shank")}
+GRAVITIES: Final = (1.0, 9.8, 9.81, 10.0)
+SCALED: Final = "sqrt(L/g)"
+RAD_IN_DEG: Final = math.degrees(1.0)
+FEET_DIGITS = 5.0  # largest distance of the feet from the slope, in units of the last digit
+CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
+    "origin": ("angles are measured from {}", {"vertical": "the vertical", "slope-normal": "the slope’s normal"}),
+    "second": ("the second angle is {}", {
+        "absolute": "absolute", "relative": "relative, swing leg minus stance leg",
+        "stance-minus-swing": "relative, stance leg minus swing leg",
+    }),
+    "unit": ("angles are in {}", {"rad": "radians", "deg": "degrees"}),
+    "positive": ("positive angles turn {}", {turn: turn for turn in ("counter-clockwise", "clockwise")}),
+    "order": ("the order is {}", {
+        order: ", ".join(order) for count in (1, 2, 3) for order in permutations(BODIES, count)
+    }),
+    "layout": ("{}", {
+        "angles-first": "the rates follow all angles", "interleaved": "each rate follows its angle",
+    }),
+    "instant": ("the state is that {}", {
+        "after-strike": "just after the heel strike", "before-strike": "just before the heel strike",
+        "mid-stance": "in mid-stance",
+    }),
+    "steps": ("period, length and multipliers are those of {}", {1: "a step", 2: "a stride, which has two steps"}),
+    "time": ("{}", {
+        "": "time is in seconds", SCALED: "time is in units of sqrt(L/g)",
+        **{f"{gravity:g}": f"gravity is {gravity:g} m/s²" for gravity in GRAVITIES},
+    }),
+}  # fmt: skip
+"""Conventions: for each, a sentence about it, and the words for its values."""
 BEFORE: Instant = "before-strike"
+NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
-PLAIN = (
-    "state", "state_before", "multipliers", "spectral_radius", "period_s", "step_length_m", "speed_m_s", "froude",
-    "knee_strike_s",
-)  # fmt: skip
-"""Quantities that the plain model computes."""
 # Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
 DIFFERENCE = 1e-6
 MAX_MOVES = 16
@@ -44,68 +66,147 @@ MAX_RESIDUAL = 1e-11  # residual of a gait, which rounding may leave
 SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is computed again
 
 
-def why_not_plain(config: RigidConfig) -> str:
-    """Explain why the plain model does not describe a config's walker, or return '' if it does."""
-    if getattr(config.walker, "leg_2", None) is not None:
-        return "the plain model has two equal legs"
-    if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
-        return "the plain model has no walkers of type parts"
-    return ""
+@dataclass(frozen=True)
+class Convention:
+    """Conventions that determine the meaning of a printed state and of printed times. `CHOICES` has their values."""
+
+    origin: str
+    second: str
+    unit: str
+    positive: str
+    order: tuple[str, ...]
+    layout: str
+    instant: Instant
+    steps: int = 1  # steps that a printed period, length or multiplier belongs to
+    time: str = ""  # unit of time, or the gravity that was used; empty for the config's
+
+    def rows(self, bodies: int) -> Floats:
+        """Return the matrix (printed angles, bodies) from absolute angles to printed ones of the same origin."""
+        K = np.eye(bodies)[[BODIES[body] for body in self.order]]
+        second = (1.0, -1.0) if self.second == "relative" else (-1.0, 1.0)
+        for row, body in enumerate(self.order):
+            if row and self.second != "absolute":
+                K[row, :2] = (-1.0, 0.0) if body == "shank" else second
+        return K * (1.0 if self.positive == "counter-clockwise" else -1.0) * (RAD_IN_DEG if self.unit == "deg" else 1.0)
+
+    def arrange(self, pairs: NDArray[Any]) -> list[Any]:
+        """Return angles and rates, or their names (2, bodies), in the order in which they are printed."""
+        return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the numbers of a printed state."""
+        return self.arrange(np.array([[f"{body}_{kind}" for body in self.order] for kind in ("angle", "rate")]))
+
+    def write(self, walker: PlainWalker, state: Floats) -> list[float]:
+        """Return the printed numbers of a state: absolute angles from the slope's normal, then rates, of all bodies."""
+        angles, rates = np.reshape(state, (2, -1))
+        K = self.rows(len(angles))
+        tilt = walker.slope if self.origin == "vertical" else 0.0
+        return self.arrange(np.stack((K @ (angles - tilt), K @ rates * self.rate_factor(walker))))
+
+    def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
+        """Return the state that printed numbers describe. Bodies that are not printed move as in the state `known`."""
+        n = len(known) // 2
+        count = len(self.order)
+        table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
+        K = self.rows(n)
+        tilt = walker.slope if self.origin == "vertical" else 0.0
+        free = [body for body in range(n) if not K[:, body].any()]
+        square = np.vstack((K, np.eye(n)[free]))
+        state = known.copy()
+        state[:n] = tilt + np.linalg.solve(square, [*table[0], *(known[free] - tilt)])
+        state[n:] = np.linalg.solve(square, [*table[1] / self.rate_factor(walker), *known[n:][free]])
+        if SWING in free and self.instant == "after-strike":
+            state[SWING] = -2.0 * walker.lean - state[STANCE]
+        if SHANK in free and n > SHANK:
+            state[SHANK], state[n + SHANK] = state[SWING], state[n + SWING]
+        return state
+
+    def rate_factor(self, walker: PlainWalker) -> float:
+        """Return the factor on rates, and on the inverse of times, due to the unit of time."""
+        if self.time == SCALED:
+            return walker.pendulum_time
+        return math.sqrt(float(self.time) / walker.gravity) if self.time else 1.0
+
+    def differences(self, other: Convention) -> list[str]:
+        """Describe each difference of this convention from another."""
+        values = {name: getattr(self, name) for name in CHOICES}
+        changes = {name: value for name, value in values.items() if value != getattr(other, name)}
+        return [CHOICES[name][0].format(CHOICES[name][1][value]) for name, value in changes.items()]
 
 
-def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
-    """Build the plain model of a config's walker, or of a changed one on its slope."""
-    walker = changed or config.walker
-    assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
-    radius = walker.foot_radius_m
-    ahead = getattr(walker, "foot_centre_ahead_m", 0.0)
-    knee = 0j
-    damping = 0.0
-    free = False
-    if isinstance(walker, CompassWalker):
-        # the compass rolls on its ball feet in the contact model only
-        radius = 0.0
-        centre = -1j * walker.mass_to_hip_m
-        parts: tuple[LegPart, ...] = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
-    elif isinstance(walker, StraightLegs):
-        centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
-        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+def stated(check: Check, count: int, bodies: int, name: str = "state") -> Convention:
+    """Return the convention that a config states for a printed state of `count` numbers.
+
+    Raises ConfigError if they do not fit.
+    """
+    angles = check.angles
+    instant = "before-strike" if name == "state_before" else check.instant
+    order = angles.order or DEFAULT_ORDERS.get(count)
+    fits = order is not None and 2 * len(order) == count
+    if order is None or not fits or any(BODIES[body] >= bodies for body in order):
+        possible = "swing, stance" + (", shank" if bodies > SHANK else "")
+        raise ConfigError(
+            f"check: {name} has {count} values, which do not fit an order of {', '.join(order or ['unknown bodies'])}.",
+            f"Give an angle and a rate for each body of check.angles.order; this walker has {possible}.",
+            ("check", "angles") if angles.order else ("check", "printed", name),
+        )
+    return Convention(angles.origin, angles.second, angles.unit, angles.positive, order, angles.layout, instant)
+
+
+def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
+    """Return a printed state's convention, with the sign of its relative angle such that both feet are on the slope."""
+    if convention.second != "relative" or len(convention.order) < 2 or convention.instant == "mid-stance":
+        return convention
+
+    def miss(reading: Convention) -> float:
+        known = np.zeros(6 if walker.kneed else 4)
+        return abs(walker.feet_apart(reading.read(walker, [item.value for item in items], known)))
+
+    opposite = replace(convention, second="stance-minus-swing")
+    near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
+    return opposite if miss(opposite) <= near < miss(convention) else convention
+
+
+def alternatives(convention: Convention) -> list[Convention]:
+    """Return all other conventions, those with the fewest differences first."""
+    possible: dict[str, Collection[Any]] = {name: words for name, (_, words) in CHOICES.items()}
+    if len(convention.order) > 1:
+        possible["order"] = [*permutations(convention.order)]
     else:
-        thigh = walker.thigh
-        shank = walker.shank
-        knee = -1j * walker.thigh.length_m
-        upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
-        lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
-        parts = (upper, lower)
-        free = walker.knee.at_heel_strike == "free"
-        damping = walker.knee.damping_N_m_s_per_rad
-    torso = walker.torso
-    return PlainWalker(
-        parts=parts,
-        knee=knee,
-        hip_mass=walker.hip_mass_kg,
-        foot=ahead - 1j * (walker.leg_length_m - radius),
-        radius=radius,
-        gravity=config.gravity_m_s2,
-        slope=config.slope_rad,
-        torso=None if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
-        hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
-        push_off=config.push_off.impulse_N_s,
-        free_at_strike=free,
-        knee_damping=damping,
-        signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
-    )
+        single = [("stance",), ("swing",)] if convention.order != ("shank",) else [convention.order]
+        possible |= {"order": single, "second": [convention.second], "layout": [convention.layout]}
+    found = starmap(Convention, product(*possible.values()))
+    return sorted(found, key=lambda other: len(other.differences(convention)))[1:]
 
 
-def scales(walker: PlainWalker, size: int) -> Floats:
-    """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
-    return np.array([1.0, 1.0, *[1.0 / walker.pendulum_time] * (size - 2)])
+def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Instant, vertical: bool) -> Floats | None:
+    """Return the state of all bodies at an instant of a step, or None if the step has no such instant.
+
+    vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
+    """
+    if instant == "after-strike":
+        return walker.full_state(start)
+    if instant == "before-strike":
+        return walker.full_state(step.before)
+    upright = walker.slope if vertical else 0.0
+
+    def lean(state: Floats) -> float:
+        return float(state[STANCE]) - upright
+
+    for piece in step.pieces:
+        if piece.start[STANCE] > upright >= piece.end[STANCE]:
+            middle = walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
+            if middle is not None:
+                return middle.end if middle.phase == BENT else walker.full_state(middle.end)
+    return None
 
 
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
     """Return the derivative of the step map at a start by central differences, or None where a step fails."""
     columns = []
-    moves = DIFFERENCE * scales(walker, len(start))
+    moves = DIFFERENCE * walker.scales(len(start))
     for k, move in enumerate(moves):
         ends = []
         for sign in (1.0, -1.0):
@@ -118,49 +219,6 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
     return np.array(columns).T
 
 
-def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
-    """Find the gait near a start by Newton's method. Return its start and step, or None if it is not found.
-
-    A  derivative of the step map of a similar walker, with which the search begins
-    """
-    unit = scales(walker, len(start))
-    identity = np.eye(len(start))
-    x, last, is_own = np.array(start, float), math.inf, False  # whether A is this walker's own derivative
-    old = error = x
-    move = np.zeros(len(x))
-    for _ in range(MAX_MOVES):
-        step = walker.step(x)
-        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
-        if step is not None and size < SMALLEST_MOVE:
-            break
-        if step is not None and size < last:
-            slow = size > SLOW_RATIO * last
-            last = size
-            old = x
-            error = step.after - x
-        elif last == math.inf:
-            return None
-        elif last < MAX_RESIDUAL:
-            step = walker.step(old)
-            return None if step is None else (old, step)
-        else:
-            slow = not is_own
-            move = 0.5 * move
-            x = old - move
-            if not slow:
-                continue
-        if A is None or slow:
-            A = derivative(walker, old, 1e-10)
-            is_own = True
-            if A is None:
-                return None
-        move = np.linalg.solve(A - identity, error)
-        x = old - move
-    else:
-        return None
-    return x, step
-
-
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
     """One step of a walker: a gait, or a first guess at one."""
@@ -168,7 +226,6 @@ class CheckedStep:
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike
     step: PlainStep
-    measured: Mapping[str, Any] = field(default_factory=dict)  # values of the compiled model by name
 
     @cached_property
     def derivative(self) -> Floats | None:
@@ -183,52 +240,83 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value from the compiled model or, if it lacks it, the plain one. Return None if both lack it."""
-        if name in self.measured:
-            return self.measured[name]
+        """Return a value by name, or None if the plain model lacks it."""
         if name == "multipliers":
             return self.multipliers
         if name == "spectral_radius":
             return abs(self.multipliers[0]) if self.multipliers else None
-        step = self.step
         speed = self.step.length / self.step.period
         return {
-            "period_s": step.period,
-            "step_length_m": step.length,
+            "period_s": self.step.period,
+            "step_length_m": self.step.length,
             "speed_m_s": speed,
             "froude": speed / math.sqrt(self.walker.gravity * self.walker.leg_length),
-            "knee_strike_s": step.knee_strike,
+            "knee_strike_s": self.step.knee_strike,
         }.get(name)
 
-    def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
-        """Return the right value of each printed number in the printed conventions, or None if the models lack it."""
+    def values(
+        self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] = NOTHING
+    ) -> dict[str, complex | None]:
+        """Return the right value of each printed number in the printed conventions, or None if the models lack it.
+
+        measured  values of the compiled model by name, which replace those of the plain one
+        """
+        instants = {"state": convention.instant, "state_before": BEFORE}
         values: dict[str, complex | None] = {}
-        factor = convention.rate_factor(self.walker)
-        written = self.written(items, convention)
+        known: dict[str, Any] = {}
+        for name in {item.quantity for item in items}:
+            if name in instants:
+                state = self.state(instants[name], convention.origin == "vertical")
+                known[name] = [] if state is None else convention.write(self.walker, state)
+            else:
+                known[name] = measured[name] if name in measured else self.quantity(name)
         for item in items:
-            value = written[item.quantity] if item.quantity in written else self.quantity(item.quantity)
+            value = known[item.quantity]
             if isinstance(value, list | tuple):
                 value = value[item.place] if item.place < len(value) else None
-            if isinstance(value, int | float | complex):
-                scale = factor ** POWERS_OF_TIME.get(item.quantity, 0)
-                scale *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
-                power = convention.steps if item.quantity == "spectral_radius" else 1
-                values[item.name] = complex((value * scale) ** power)
-            else:
-                values[item.name] = None
+            if value is not None:
+                value *= convention.rate_factor(self.walker) ** POWERS_OF_TIME.get(item.quantity, 0)
+                value *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
+                value = complex(value ** (convention.steps if item.quantity == "spectral_radius" else 1))
+            values[item.name] = value
         listed = [item for item in items if item.quantity == "multipliers"]
-        multipliers = self.quantity("multipliers") if listed else ()
-        return values | match_multipliers(listed, [value**convention.steps for value in multipliers])
+        return values | match_multipliers(listed, [value**convention.steps for value in known.get("multipliers", ())])
 
     @cache  # noqa: B019 - walks are few, and live as long as their check
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         return state_at(self.walker, self.start, self.step, instant, vertical)
 
-    def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
-        """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
-        written = {}
-        instants = {"state": convention.instant, "state_before": BEFORE}
-        for name in instants.keys() & {item.quantity for item in items}:
-            state = self.state(instants[name], convention.origin == "vertical")
-            written[name] = [] if state is None else convention.write(self.walker, state)
-        return written
+
+def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> CheckedStep | None:
+    """Find the gait near a start by Newton's method, or return None if it is not found.
+
+    A  derivative of the step map of a similar walker, with which the search begins
+    """
+    unit = walker.scales(len(start))
+    best: CheckedStep | None = None
+    x: Floats = np.array(start, float)
+    last = math.inf
+    is_own = False  # whether A is this walker's own derivative
+    for _ in range(MAX_MOVES):
+        step = walker.step(x)
+        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
+        if step is not None and size < last:
+            best = CheckedStep(walker, x, step)
+            if size < SMALLEST_MOVE:
+                return best
+            slow = size > SLOW_RATIO * last
+            last = size
+        elif best is None or last < MAX_RESIDUAL:
+            return best
+        elif is_own:
+            x = 0.5 * (x + best.start)
+            continue
+        else:
+            slow = True
+        if A is None or slow:
+            A = derivative(walker, best.start, 1e-10)
+            is_own = True
+            if A is None:
+                return None
+        x = best.start - np.linalg.solve(A - np.eye(len(x)), best.step.after - best.start)
+    return None

@@ -13,15 +13,21 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from itertools import permutations, product
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
-from scipy.optimize import brentq
+from scipy.linalg.lapack import dposv
+
+from walkerlab.config.check import Instant
+from walkerlab.config.reads import RigidConfig
+from walkerlab.config.second_leg import describe_second_leg
+from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -29,15 +35,23 @@ Event = Callable[[Floats], float]
 SWING = 0
 STANCE = 1
 SHANK = 2
+TORSO = 3
+ROLLING = 4
 EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first guesses
 LONGEST_SWING = 12.0  # sqrt(L/g)
 FALLEN = 1.5  # rad, angle of the stance leg
 MAX_EULER_STEPS = 400_000
 LARGEST_STEP = 0.3  # sqrt(L/g)
-LOCATING_ROUNDS, TINY = 2, 1e-7  # s
+LOCATING_ROUNDS, TINY = 4, 1e-7  # s
 STRAIGHT = "straight"
 BENT = "bent"
 """Phases of a swing: with a straight leg, and with a free knee."""
+REDUCTIONS: Final = {
+    STRAIGHT: np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5], [0.0, 1.0]]),
+    BENT: np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]),
+}
+"""Matrices (bodies, coordinates), by phase, from the rates of the coordinates to those of all bodies: swing leg or its
+thigh, stance leg, swing shank, torso, and the ground on which the stance foot rolls."""
 
 
 class LegPart(NamedTuple):
@@ -48,18 +62,21 @@ class LegPart(NamedTuple):
     inertia: float  # kg m^2, about the centre of mass
 
 
+NO_PART: Final = LegPart(0.0, 0j, 0.0)
+
+
 @dataclass(frozen=True)
 class PlainWalker:
     """A walker on its slope, and the mistakes in its equations. SI units."""
 
-    parts: tuple[LegPart, ...]  # of one leg: the whole leg, or thigh and shank
+    parts: tuple[LegPart, LegPart]  # of one leg: thigh and shank, or the whole leg and no part
     knee: complex  # m, from hip to knee; 0 for straight legs
     hip_mass: float
     foot: complex  # m, from hip to the centre of the foot's arc, leg upright
     radius: float
     gravity: float
     slope: float
-    torso: LegPart | None = None  # with positions relative to the hip
+    torso: LegPart = NO_PART  # with positions relative to the hip
     hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
     push_off: float = 0.0  # N s
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
@@ -78,7 +95,7 @@ class PlainWalker:
 
     @property
     def kneed(self) -> bool:
-        return len(self.parts) > 1
+        return self.knee != 0.0
 
     @property
     def leg_length(self) -> float:
@@ -97,105 +114,80 @@ class PlainWalker:
     def leg_inertia(self) -> float:
         return sum(part.inertia for part in self.parts)
 
-    def reduction(self, phase: str) -> Floats:
-        """Return the matrix (bodies, coordinates) from the rates of the coordinates to those of all bodies."""
-        coordinates = np.eye(3 if self.kneed and phase == BENT else 2)
-        return (
-            coordinates
-            if self.torso is None
-            else np.vstack((coordinates, np.resize([0.5, 0.5, 0.0], len(coordinates))))
-        )
-
     @cached_property
     def masses(self) -> Floats:
-        """Point masses: those of the swing leg, of the stance leg, of the hip and of the torso."""
+        """Point masses: two of the swing leg, two of the stance leg, the hip and the torso."""
         leg = [part.mass for part in self.parts]
-        return np.array([*leg, *leg, self.hip_mass, *([] if self.torso is None else [self.torso.mass])])
+        return np.array([*leg, *leg, self.hip_mass, self.torso.mass])
 
-    def inertias(self, phase: str) -> Floats:
-        """Return the inertias of all bodies."""
-        leg = [part.inertia for part in self.parts]
-        swing = leg if phase == BENT else [sum(leg)]
-        return np.array([swing[0], sum(leg), *swing[1:], *([] if self.torso is None else [self.torso.inertia])])
+    @cached_property
+    def inertias(self) -> Floats:
+        """Inertias of all bodies."""
+        upper, lower = self.parts
+        return np.array([upper.inertia, self.leg_inertia, lower.inertia, self.torso.inertia, 0.0])
 
-    def levers(self, phase: str, foot: complex) -> Complex:
-        """Return the levers (masses, bodies). A mass is at the sum over bodies of lever times exp(i psi)."""
-        n = len(self.parts)
-        levers = np.zeros((len(self.masses), len(self.reduction(phase))), complex)
+    def levers_about(self, foot: complex, radius: float) -> Complex:
+        """Return the levers (masses, bodies). The velocity of a mass is the sum of i lever exp(i psi) omega.
+
+        A foot of a radius rolls like a lever that keeps its direction.
+        """
+        upper, lower = self.parts
+        levers = np.zeros((6, 5), complex)
         levers[:, STANCE] = -foot
-        for place, (hinge, part) in enumerate(zip((0j, self.knee), self.parts, strict=False)):
-            levers[n + place, STANCE] += hinge + part.centre
-            levers[place, SWING] = hinge
-            levers[place, SHANK if place and phase == BENT else SWING] += part.centre
-        if self.torso is not None:
-            levers[-1, -1] = self.torso.centre
+        levers[:, ROLLING] = 1j * radius
+        levers[2:4, STANCE] += upper.centre, self.knee + lower.centre
+        levers[0, SWING] = upper.centre
+        levers[1, [SWING, SHANK]] = self.knee, lower.centre
+        levers[5, TORSO] = self.torso.centre
         return levers
 
     @cached_property
-    def phases(self) -> dict[str, Phase]:
-        """Sums over the point masses, by phase, from which the equations of motion are formed."""
-        return {phase: self.sums(phase) for phase in (STRAIGHT, BENT)}
+    def levers(self) -> Complex:
+        return self.levers_about(self.foot, self.radius)
 
-    def sums(self, phase: str) -> Phase:
-        levers = self.levers(phase, self.foot)
-        moments = (levers.conj().T * self.masses) @ levers
-        bodies = range(len(moments))
-        constant = np.diag(moments.real.diagonal() + self.inertias(phase))
-        constant[STANCE, STANCE] += self.radius**2 * self.mass
-        signs = [[self.signs.get((phase, k, l), 1.0) for l in bodies] for k in bodies]
-        first = self.masses @ levers
-        return Phase(self.reduction(phase), levers, constant.tolist(), moments.tolist(), first.tolist(), signs)
+    @cached_property
+    def moments(self) -> Complex:
+        """Moments of inertia (bodies, bodies) of the masses with two levers and, on the diagonal, of the bodies."""
+        return np.asarray(self.levers.conj().T * self.masses @ self.levers + np.diag(self.inertias))
 
-    def motions(self, angles: Floats, levers: Complex, radius: float) -> Complex:
-        """Return the velocities (masses, bodies) of all masses per unit rate of each body, with the foot rolling."""
-        D: Complex = 1j * levers * np.exp(1j * angles)
-        D[:, STANCE] -= radius
-        return D
+    @cached_property
+    def weights(self) -> Complex:
+        """Moments of the weight of all masses with the lever of each body."""
+        return np.asarray(self.masses @ self.levers * np.conj(self.down))
+
+    @cached_property
+    def factors(self) -> dict[str, Floats]:
+        """Factors (bodies, bodies) on the velocity terms, by phase. A lever that does not turn has none."""
+        factors = {phase: np.repeat([[1.0, 1.0, 1.0, 1.0, 0.0]], 5, axis=0) for phase in REDUCTIONS}
+        for (phase, row, column), factor in self.signs.items():
+            factors[phase][row, column] = factor
+        for table in factors.values():
+            table[ROLLING] = table[STANCE]  # the stance leg's equation has both rows
+        return factors
+
+    def bodies(self, phase: str, state: Floats) -> Floats:
+        """Return the angles and the rates (2, bodies) of all bodies."""
+        bodies: Floats = np.reshape(state, (2, -1)) @ REDUCTIONS[phase].T
+        bodies[0, ROLLING] = 0.0
+        return bodies
+
+    def mass_matrix(self, places: Complex, inertias: Floats) -> Floats:
+        """Return the mass matrix of all bodies from their turned levers."""
+        return np.asarray((places.conj().T * self.masses @ places).real + np.diag(inertias))
 
     def rates(self, phase: str, state: Floats) -> Floats:
         """Return the derivative of a state by Lagrange's equations."""
-        sums = self.phases[phase]
-        Z = sums.reduction
-        n = Z.shape[1]
-        follows = n < len(Z)
-        rates = state[n:].tolist()
-        angles = (Z @ state[:n]).tolist() if follows else state[:n].tolist()
-        omega = (Z @ state[n:]).tolist() if follows else rates
-        turns = [cmath.exp(1j * angle) for angle in angles]
-        # velocity of all masses per unit rate: i lever turn, and -R for the stance leg, on which the foot rolls
-        M = [row.copy() for row in sums.constant]
-        forces = [0.0] * len(omega)
-        for k, turn in enumerate(turns):
-            lever = sums.first[k] * turn
-            signs = sums.signs[k]
-            M[k][STANCE] += self.radius * lever.imag
-            M[STANCE][k] += self.radius * lever.imag
-            forces[STANCE] -= sums.signs[STANCE][k] * self.radius * lever.real * omega[k] ** 2
-            forces[k] += (-1j * lever.conjugate() * self.down).real
-            for l in range(k):
-                pull = sums.moments[k][l] * turn.conjugate() * turns[l]
-                M[k][l] += pull.real
-                M[l][k] += pull.real
-                # the centripetal acceleration is -lever turn omega^2
-                forces[k] += signs[l] * pull.imag * omega[l] ** 2
-                forces[l] -= sums.signs[l][k] * pull.imag * omega[k] ** 2
-        forces[STANCE] -= self.radius * self.mass * self.down.real
+        Z = REDUCTIONS[phase]
+        angles, omega = self.bodies(phase, state)
+        turns = np.exp(1j * angles)
+        pulls = self.moments * np.multiply.outer(turns.conj(), turns)
+        # the acceleration of a mass at constant rates is the sum of -lever exp(i psi) omega^2
+        forces = (self.factors[phase] * pulls.imag) @ omega**2 - (self.weights * turns).imag
         spring, damper, torque = self.hip
         twist = torque - spring * (angles[SWING] - angles[STANCE]) - damper * (omega[SWING] - omega[STANCE])
-        forces[SWING] += twist
-        forces[STANCE] -= twist
-        if self.kneed and phase == BENT:
-            drag = self.knee_damping * (omega[SHANK] - omega[SWING])
-            forces[SHANK] -= drag
-            forces[SWING] += drag
-        if follows:
-            M = (Z.T @ M @ Z).tolist()
-            forces = (Z.T @ forces).tolist()
-        return np.array(rates + eliminate(M, forces))
-
-    @cached_property
-    def mass(self) -> float:
-        return float(self.masses.sum())
+        drag = self.knee_damping * (omega[SHANK] - omega[SWING])
+        forces[:3] += twist + drag, -twist, -drag
+        return np.concatenate((state[Z.shape[1] :], dposv(Z.T @ pulls.real @ Z, Z.T @ forces)[1]))
 
     @cached_property
     def down(self) -> complex:
@@ -214,19 +206,15 @@ class PlainWalker:
         """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
-    def energy(self, phase: str, state: Floats) -> float:
+    def energy(self, state: Floats) -> float:
         """Return kinetic plus potential energy (J).
 
         Heights are measured from the point where an upright stance leg touches the slope.
         """
-        Z = self.reduction(phase)
-        angles, omega = np.reshape(state, (2, -1)) @ Z.T
-        levers = self.phases[phase].levers
-        velocities = self.motions(angles, levers, self.radius) @ omega
-        rolled = 1j * self.radius - self.radius * angles[STANCE]
-        places = levers @ np.exp(1j * angles) + rolled
-        kinetic = 0.5 * (self.masses @ np.abs(velocities) ** 2 + self.inertias(phase) @ omega**2)
-        return float(kinetic - self.masses @ (places * np.conj(self.down)).real)
+        angles, omega = self.bodies(STRAIGHT if len(state) == 4 else BENT, state)
+        places = self.levers * np.exp(1j * angles)
+        heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
+        return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
 
     def balances(self) -> tuple[str, ...]:
         """Describe the bodies and points about which a heel strike conserves angular momentum."""
@@ -238,35 +226,25 @@ class PlainWalker:
 
         before  state just before it, swing leg straight
         """
-        phase = BENT if self.free_at_strike else STRAIGHT
-        Z = self.reduction(phase)
-        old_angles, old = np.reshape(before[:4], (2, 2)) @ self.reduction(STRAIGHT).T
+        Z = REDUCTIONS[BENT if self.free_at_strike else STRAIGHT]
+        old_angles, old = self.bodies(STRAIGHT, before)
         foot, radius = (self.foot, self.radius) if self.strike_foot is None else (self.strike_foot, 0.0)
         pivot = (foot, radius) if self.turned_on_it else (self.foot, self.radius)
-        velocities = self.motions(old_angles, self.levers(STRAIGHT, pivot[0]), pivot[1]) @ old
-        legs = len(self.parts)
-        order = [*range(legs, 2 * legs), *range(legs), *range(2 * legs, len(velocities))]
-        bodies = [STANCE, SWING, *([STANCE] if phase == BENT else []), *([-1] if self.torso else [])]
-        angles = old_angles[bodies]
-        omega = old[bodies]
-        J = self.motions(angles, self.levers(phase, foot), radius) @ Z
-        weighted = J.conj().T * self.masses
-        inertias = self.inertias(phase)
-        inertias[: len(bodies) - int(self.torso is not None)] *= self.strike_inertia
-        momentum = (weighted @ velocities[order]).real + Z.T @ (inertias * omega)
+        moving = self.levers_about(*pivot) * np.exp(1j * old_angles) @ old
+        # the legs exchange their roles
+        angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
+        places = self.levers_about(foot, radius) * np.exp(1j * angles)
+        inertias = self.inertias * [*[self.strike_inertia] * 3, 1.0, 0.0]
+        momentum = (places.conj().T * self.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
         if self.push_off:
             # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
             to_hip = -self.foot * cmath.exp(1j * angles[SWING]) + 1j * self.radius
             hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
             momentum[STANCE] += self.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real
-        M = (weighted @ J).real + Z.T @ (inertias[:, None] * Z)
+        n = Z.shape[1]
         # whole walker, trailing leg and, if it is free, trailing shank
-        T = np.ones((Z.shape[1], Z.shape[1]))
-        T[1:] = 0.0
-        T[1, [SWING, *range(2, Z.shape[1])]] = 1.0
-        if Z.shape[1] > 2:
-            T[2, SHANK] = 1.0
-        M = T @ M
+        T = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]])[:n, :n] @ Z.T
+        M = T @ self.mass_matrix(places, inertias) @ Z
         momentum = T @ momentum
         momentum[1] -= self.leg_inertia * float(np.dot(self.extra_inertia, omega[:2]))
         if self.keeps_trailing_rate:
@@ -282,16 +260,38 @@ class PlainWalker:
             angles[STANCE] = -2.0 * self.lean - angles[SWING]
         return np.concatenate((angles, np.linalg.solve(M, momentum)))
 
+    def full_state(self, coordinates: Floats) -> Floats:
+        """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
+        if not self.kneed:
+            return coordinates[:4]
+        shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
+        return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
+
+    def coordinates(self, state: Floats) -> Floats:
+        """Return the coordinates just after a heel strike from the state of all bodies."""
+        n = len(state) // 2
+        return np.concatenate((state[:2], state[n : n + 2 + int(self.kneed and self.free_at_strike)]))
+
+    def start_from(self, state: Floats, instant: Instant) -> Floats | None:
+        """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
+        if instant == "after-strike":
+            return self.coordinates(state)
+        n = len(state) // 2
+        if instant == "before-strike":
+            return self.after_strike(np.concatenate((state[:2], state[n : n + 2])))
+        landed = self.land(state)
+        return None if landed is None else self.after_strike(landed[-1].end)
+
+    def scales(self, size: int) -> Floats:
+        """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
+        return np.array([1.0, 1.0, *[1.0 / self.pendulum_time] * (size - 2)])
+
     def step(self, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
         """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
 
         start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
         """
-        state = np.asarray(start, float)
-        if self.kneed:
-            rates = state[2:] if len(state) > 4 else np.append(state[2:], state[2])
-            state = np.array([*state[:2], state[0], *rates])
-        pieces = self.land(state, tolerance)
+        pieces = self.land(self.full_state(start), tolerance)
         if pieces is None:
             return None
         before = pieces[-1].end
@@ -318,95 +318,66 @@ class PlainWalker:
         self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
     ) -> Piece | None:
         """Integrate until `event` falls to zero in a state for which `counts` is true. None if that never happens."""
+        old_time = 0.0
+        old = start
+        before = event(start)
+        for time, state in self.course(phase, start, tolerance):
+            after = event(state)
+            if before > 0.0 >= after:
+                share = before / (before - after) if self.interpolates else 1.0
+                move = float(share * (time - old_time))
+                end = old + share * (state - old)
+                if not self.euler_step:
+                    move, end = self.locate(phase, old, event, move, tolerance)
+                if counts(end):
+                    return Piece(phase, start, float(old_time) + move, end)
+            if abs(state[STANCE]) > FALLEN:
+                return None
+            old_time = time
+            old = state
+            before = after
+        return None
+
+    def course(self, phase: str, state: Floats, tolerance: float) -> Iterator[tuple[float, Floats]]:
+        """Yield the times and states to which the steps of an integration lead."""
         latest = LONGEST_SWING * self.pendulum_time
         if self.euler_step:
-            return self.euler(phase, start, event, counts, latest)
-        scale = np.repeat((1.0, 1.0 / self.pendulum_time), len(start) // 2)
+            for count in range(1, min(int(latest / self.euler_step), MAX_EULER_STEPS)):
+                state = state + self.euler_step * self.rates(phase, state)
+                yield self.euler_step * count, state
+            return
+        solver = self.solver(phase, state, latest, tolerance)
+        while solver.status == "running":
+            solver.step()
+            yield solver.t, solver.y
 
+    def solver(self, phase: str, state: Floats, end: float, tolerance: float) -> DOP853:
         def rates(_time: float, state: Floats) -> Floats:
             return self.rates(phase, state)
 
-        def solver(begin: float, state: Floats, end: float) -> DOP853:
-            largest = LARGEST_STEP * self.pendulum_time
-            return DOP853(rates, begin, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
+        scale = np.repeat((1.0, 1.0 / self.pendulum_time), len(state) // 2)
+        largest = LARGEST_STEP * self.pendulum_time
+        return DOP853(rates, 0.0, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
 
-        walk = solver(0.0, start, latest)
-        before = event(start)
-        while walk.status == "running" and abs(walk.y[STANCE]) < FALLEN:
-            old_time = walk.t
-            old = walk.y
-            walk.step()
-            after = event(walk.y)
-            if before > 0.0 >= after:
-                course = walk.dense_output()
-                time = brentq(lambda time, course=course: event(course(time)), old_time, walk.t, xtol=1e-15)
-                for _ in range(LOCATING_ROUNDS):
-                    landing = solver(old_time, old, time)
-                    while landing.status == "running":
-                        landing.step()
-                    # The interpolant is less accurate than the integration.
-                    state = landing.y
-                    slope = event(landing.y + TINY * self.rates(phase, landing.y))
-                    time -= event(state) * TINY / (slope - event(state))
-                if counts(state):
-                    return Piece(phase, start, time, state)
-            before = after
-        return None
-
-    def euler(
-        self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], latest: float
-    ) -> Piece | None:
-        """Integrate like `swing`, but by Euler's method with a fixed step."""
-        step = self.euler_step
-        state = start
-        before = event(start)
-        for count in range(1, min(int(latest / step), MAX_EULER_STEPS)):
-            old = state
-            state = state + step * self.rates(phase, state)
-            after = event(state)
-            if abs(state[STANCE]) > FALLEN:
-                return None
-            if before > 0.0 >= after and counts(state):
-                share = before / (before - after) if self.interpolates else 1.0
-                return Piece(phase, start, step * (count - 1 + share), old + share * (state - old))
-            before = after
-        return None
+    def locate(self, phase: str, state: Floats, event: Event, move: float, tolerance: float) -> tuple[float, Floats]:
+        """Return when and in which state an event is zero, by Newton's method. The first guess is a time `move`."""
+        time = 0.0
+        for _ in range(LOCATING_ROUNDS):
+            time += move
+            solver = self.solver(phase, state, move, tolerance)
+            while solver.status == "running":
+                solver.step()
+            state = solver.y
+            value = event(state)
+            move = float(-TINY * value / (event(state + TINY * self.rates(phase, state)) - value))
+        return time, state
 
     def after_knee_strike(self, state: Floats) -> Floats:
         """Return the state with a straight leg just after the knee has locked."""
-        D = self.motions(self.reduction(BENT) @ state[:3], self.phases[BENT].levers, self.radius) @ self.reduction(BENT)
-        M = (D.conj().T * self.masses @ D).real
-        M += self.reduction(BENT).T * self.inertias(BENT) @ self.reduction(BENT)
-        locked = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
-        rates = np.linalg.solve(locked.T @ M @ locked, locked.T @ M @ state[3:])
-        return np.concatenate((state[:2], rates))
-
-
-class Phase(NamedTuple):
-    """Sums over the point masses of a walker in one phase."""
-
-    reduction: Floats  # (bodies, coordinates)
-    levers: Complex  # m, (masses, bodies)
-    constant: list[list[float]]  # kg m^2, part of the mass matrix that no angle changes
-    moments: list[list[complex]]  # kg m^2, of two levers
-    first: list[complex]  # kg m, of one lever
-    signs: list[list[float]]  # factors on velocity terms
-
-
-def eliminate(M: list[list[float]], forces: list[float]) -> list[float]:
-    """Solve M x = forces for a small symmetric positive M, which needs no pivots. Both are overwritten."""
-    n = len(forces)
-    for pivot in range(n):
-        for row in range(pivot + 1, n):
-            factor = M[row][pivot] / M[pivot][pivot]
-            for column in range(pivot + 1, n):
-                M[row][column] -= factor * M[pivot][column]
-            forces[row] -= factor * forces[pivot]
-    for row in range(n - 1, -1, -1):
-        for column in range(row + 1, n):
-            forces[row] -= M[row][column] * forces[column]
-        forces[row] /= M[row][row]
-    return forces
+        Z = REDUCTIONS[STRAIGHT]
+        angles, omega = self.bodies(BENT, state)
+        M = self.mass_matrix(self.levers * np.exp(1j * angles), self.inertias)
+        return np.concatenate((state[:2], np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ omega)))
 
 
 class Piece(NamedTuple):
@@ -431,3 +402,112 @@ class PlainStep(NamedTuple):
     def knee_strike(self) -> float | None:
         """Time (s) of the knee strike from the start, or None without knees."""
         return self.pieces[0].duration if len(self.pieces) > 1 else None
+
+
+def why_not_plain(config: RigidConfig) -> str:
+    """Explain why the plain model does not describe a config's walker, or return '' if it does."""
+    if describe_second_leg(config.walker):
+        return "the plain model has two equal legs"
+    if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
+        return "the plain model has no walkers of type parts"
+    return ""
+
+
+def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
+    """Build the plain model of a config's walker, or of a changed one on its slope."""
+    walker = changed or config.walker
+    assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
+    # the compass rolls on its ball feet in the contact model only
+    radius = 0.0 if isinstance(walker, CompassWalker) else walker.foot_radius_m
+    torso = walker.torso
+    plain = PlainWalker(
+        parts=(NO_PART, NO_PART),
+        knee=0j,
+        hip_mass=walker.hip_mass_kg,
+        foot=getattr(walker, "foot_centre_ahead_m", 0.0) - 1j * (walker.leg_length_m - radius),
+        radius=radius,
+        gravity=config.gravity_m_s2,
+        slope=config.slope_rad,
+        torso=NO_PART if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
+        push_off=config.push_off.impulse_N_s,
+        signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
+    )
+    if not isinstance(walker, Kneed):
+        below = walker.mass_to_hip_m if isinstance(walker, CompassWalker) else walker.leg_mass_below_hip_m
+        centre = getattr(walker, "leg_mass_ahead_m", 0.0) - 1j * below
+        return replace(plain, parts=(LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART))
+    thigh = walker.thigh
+    shank = walker.shank
+    upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+    lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+    free = walker.knee.at_heel_strike == "free"
+    damping = walker.knee.damping_N_m_s_per_rad
+    knee = -1j * thigh.length_m
+    return replace(plain, parts=(upper, lower), knee=knee, free_at_strike=free, knee_damping=damping)
+
+
+class Mistake(NamedTuple):
+    """A mistake that is known from publications and programs."""
+
+    what: str  # ends a sentence that begins with 'All printed values follow if'; with a place {} for a size
+    of_size: Callable[[float], PlainWalker]  # walker with the mistake
+    first: float = 0.0  # a size to begin with, or 0 if the mistake has no size
+    limits: tuple[float, float] = (0.0, 0.0)  # of sizes; smaller ones are within a program's own errors
+
+
+def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
+    """Yield all known mistakes in programs for a walker."""
+
+    def mistake(what: str, **changes: Any) -> Mistake:
+        return Mistake(what, lambda _: replace(right, **changes))
+
+    def mistake_of_size(what: str, field: str, first: float, limits: tuple[float, float], **changes: Any) -> Mistake:
+        return Mistake(what, lambda size: replace(right, **{field: size, **changes}), first, limits)
+
+    for what, signs in wrong_signs(right.kneed):
+        yield mistake(what, signs={**right.signs, **{term: -right.signs.get(term, 1.0) for term in signs}})
+    if right.leg_inertia:
+        rates = {
+            "the trailing leg's rate": (1.0, 0.0),
+            "the leading leg's rate": (0.0, 1.0),
+            "(trailing leg's rate − leading leg's rate)": (1.0, -1.0),
+        }
+        momentum = "the trailing leg's angular momentum about the hip before the heel strike"
+        for (rate, weights), (mark, sign) in product(rates.items(), (("−", 1.0), ("+", -1.0))):
+            what = f"{momentum} has an extra term {mark}I × {rate}, where I is the leg's inertia"
+            yield mistake(what, extra_inertia=tuple(sign * weight for weight in weights))
+        massless = tuple(part._replace(inertia=0.0) for part in right.parts)
+        yield mistake("the legs' inertia is left out", parts=massless)
+        yield mistake("the legs' inertia is left out of the heel strike", strike_inertia=0.0)
+    yield mistake("the trailing leg keeps its rate through the heel strike", keeps_trailing_rate=True)
+    if right.radius:
+        for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
+            what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
+            yield mistake(what, strike_foot=point)
+            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
+    if right.hip_mass:
+        yield mistake("the hip's mass counts once for each leg", hip_mass=2.0 * right.hip_mass)
+    early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"
+    angle = ("window", 1e-3, (1e-5, 0.3))
+    yield mistake_of_size(early, *angle)
+    yield mistake_of_size(f"{early}, and both feet are then put on the slope", *angle, evens_angles=True)
+    step = "the equations are integrated by Euler's method with a step of {} s"
+    time = ("euler_step", 4e-3 * right.pendulum_time, (2e-5, 0.2))
+    yield mistake_of_size(step, *time)
+    yield mistake_of_size(
+        f"{step}, and the swing ends at the first time step after the heel strike", *time, interpolates=False
+    )
+
+
+def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
+    """Yield velocity terms in the equations of motion that may have a wrong sign, with a description."""
+    for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
+        when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
+        bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}
+        if phase == BENT:
+            bodies |= {"swing leg": (SWING,), "swing shank": (SHANK,)}
+        for (row, rows), (column, columns) in permutations(bodies.items(), 2):
+            what = f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign{when}"
+            yield what, [*product((phase,), rows, columns)]
+        yield f"all velocity terms have the wrong sign{when}", [*product((phase,), range(4), range(4))]

@@ -1,79 +1,125 @@
-"""Comparison of printed values with right ones: the number of digits that agree, and the verdict."""
+"""Printed numbers beside right ones: the number of digits that agree, and the verdict."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from enum import StrEnum
+from functools import cached_property
+from typing import Any, Final
 
 from walkerlab.config.check import Digits, PrintedValue, agreement, parse_printed
 from walkerlab.labels import axis_label
 
-REPRODUCED = "reproduced"
-DIFFERENT = "different"
-NOT_COMPARABLE = "not-comparable"
-EXPLAINED = "explained"
 UNEXPLAINED = "different, unexplained"
 # At least this many digits must agree, and at least half of them, where the last ones may differ.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
 """Numerical error of right values (relative to 1 or to the value) by quantity; of all others `EXACT_ERROR`."""
 EXACT_ERROR = 2e-12
+MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
+MOST_DECIMALS: Final = 12
 
 
-@dataclass(frozen=True)
-class Item:
-    """One printed number, or one component of a printed list."""
+class Verdict(StrEnum):
+    """Verdict on a printed number. Some are of the study alone, which has its own scene and its own contradictions."""
 
-    name: str  # such as period_s, state.stance_angle or multipliers.1
-    quantity: str  # name without its component
-    place: int  # index of the component
-    printed: PrintedValue
+    INPUT = "input"  # of the study: used as given
+    REPRODUCED = "reproduced"
+    EXPLAINED = "explained"
+    CONTRADICTED = "contradicted"  # of the study: different, by its own values
+    DIFFERENT = "different"
+    NOT_REPRODUCED = "not-reproduced"  # of the study: different and unexplained, or not comparable
+    NOT_COMPARABLE = "not-comparable"
 
-    def own_error(self, right: complex) -> float:
-        return OWN_ERROR.get(self.quantity, EXACT_ERROR) * max(1.0, abs(right))
+
+class PrintedNumber:
+    """A printed number, with its digits."""
+
+    quantity: str
+    text: str  # as printed
+
+    @cached_property
+    def printed(self) -> PrintedValue:
+        value = parse_printed(self.text.rstrip("% "))
+        assert value is not None, "the config has refused values that cannot be read"
+        return value
 
     @property
-    def digits(self) -> int:
+    def about(self) -> dict[str, Any]:
+        """Name or source, as JSON values."""
+        return {"quantity": self.quantity}
+
+    @property
+    def digits(self) -> Digits:
+        """The number or its real part, without bounds."""
+        return self.printed.real
+
+    @property
+    def value(self) -> float:
+        return self.digits.value
+
+    @property
+    def count(self) -> int:
         """Number of printed digits."""
-        parts = [self.printed.real, *([self.printed.imaginary] if self.printed.imaginary else [])]
-        return min(part.count for part in parts)
+        return min(part.count for part in (self.digits, self.printed.imaginary) if part is not None)
 
     @property
-    def unit(self) -> float:
+    def last_digit(self) -> float:
         """Unit of the last digit, or half the width of finite bounds."""
-        bounds = self.printed.bounds
-        if bounds is not None and math.isfinite(bounds[1] - bounds[0]):
-            return max(0.5 * (bounds[1] - bounds[0]), self.printed.real.unit)
-        return self.printed.real.unit
+        low, high = self.printed.bounds or (0.0, math.inf)
+        return max(0.5 * (high - low), self.digits.unit) if math.isfinite(high - low) else self.digits.unit
 
-    def agreement(self, right: complex) -> int:
+    def agreeing(self, right: complex) -> int:
         """Count the printed digits that agree with the right value, rounded or truncated."""
-        error = self.own_error(right)
+        error = OWN_ERROR.get(self.quantity, EXACT_ERROR) * max(1.0, abs(right))
         if self.printed.bounds is not None:
             low, high = self.printed.bounds
-            return self.digits if low - error <= right.real <= high + error else 0
-        agreeing = equal_digits(self.printed.real, right.real, error)
+            return self.count if low - error <= right.real <= high + error else 0
+        agreeing = equal_digits(self.digits, right.real, error)
         if self.printed.imaginary is not None:
             imaginary = abs(right.imag) if self.printed.both_signs else right.imag
             return min(agreeing, equal_digits(self.printed.imaginary, imaginary, error))
-        return min(agreeing, 0 if abs(right.imag) > 0.5 * self.printed.real.unit + error else self.digits)
+        return 0 if abs(right.imag) > 0.5 * self.digits.unit + error else agreeing
 
     def fits(self, right: complex | None) -> bool:
         """Whether a value agrees with every printed digit."""
-        return right is not None and self.agreement(right) == self.digits
+        return right is not None and self.agreeing(right) == self.count
 
     def miss(self, right: complex | None) -> float:
         """Return the distance of a value from the printed one in units of its last digit, or of half its bounds."""
         if right is None:
             return math.inf
-        bounds = self.printed.bounds
-        if bounds is not None:
-            return max(0.0, bounds[0] - right.real, right.real - bounds[1]) / self.unit
+        if self.printed.bounds is not None:
+            low, high = self.printed.bounds
+            return max(0.0, low - right.real, right.real - high) / self.last_digit
         if self.printed.both_signs:
             right = complex(right.real, abs(right.imag))
-        return abs(right - self.printed.value) / self.unit
+        return abs(right - self.printed.value) / self.last_digit
+
+    def write(self, right: complex) -> str:
+        """Format a right value with `MORE_DIGITS` more digits than the printed one."""
+        decimals = min(max(round(-math.log10(self.digits.unit)) + MORE_DIGITS, 0), MOST_DECIMALS)
+        text = f"{right.real:.{decimals}f}"
+        if self.printed.imaginary is None and not right.imag:
+            return text
+        sign = "±" if self.printed.both_signs else "+" if right.imag >= 0.0 else "-"
+        return f"{text} {sign} {abs(right.imag):.{decimals}f}i"
+
+
+@dataclass(frozen=True)
+class Item(PrintedNumber):
+    """A printed number of a gait: a value, or one component of a list."""
+
+    name: str  # such as period_s, state.stance_angle or multipliers.1
+    quantity: str  # name without its component
+    place: int  # index of the component
+    text: str
+
+    @property
+    def about(self) -> dict[str, Any]:
+        return {"name": self.name}
 
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
@@ -90,37 +136,54 @@ def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
 def spell_name(name: str) -> str:
     """Spell the name of a printed number, such as 'stance rate' or 'step period 1', without its unit."""
     quantity, _, part = name.partition(".")
-    if quantity == "state":
-        return part.replace("_", " ")
-    if quantity == "state_before":
-        return f"{part.replace('_', ' ')} before"
+    if quantity.startswith("state"):
+        return f"{part}{quantity.removeprefix('state')}".replace("_", " ")
     return f"{axis_label(quantity).removesuffix('s')} {part}" if part else axis_label(quantity)
 
 
-class Judgement(NamedTuple):
-    """Verdict on one printed value."""
+@dataclass(frozen=True)
+class Judged:
+    """A printed number, what it was compared with, and the verdict."""
 
-    verdict: str
-    digits: int
+    number: PrintedNumber
+    values: Mapping[str, Any]  # JSON values by name
+    verdict: Verdict
     evidence: str
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """Row of a table, as JSON values."""
+        printed = {**self.number.about, "printed": self.number.text}
+        return {**printed, **self.values, "verdict": self.verdict.value, "evidence": self.evidence}
 
-def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
-    """Compare a printed value with the right one. If `right` is None, `reason` explains why."""
+
+def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
+    """Compare a printed number with the right one. If `right` is None, `reason` explains why."""
+    agreeing = 0 if right is None else item.agreeing(right)
+    miss = item.miss(right)
+    all_digits = agreeing == item.count
+    enough = all_digits or (agreeing >= FEWEST_DIGITS and 2 * agreeing >= item.count)
+    verdict = Verdict.REPRODUCED if enough else Verdict.DIFFERENT
+    value: Any = None
     if right is None:
-        return Judgement(NOT_COMPARABLE, 0, reason)
-    agreeing = item.agreement(right)
-    total = item.digits
-    units = format_units(item.miss(right))
-    if item.printed.bounds is not None:
-        if agreeing == total:
-            return Judgement(REPRODUCED, agreeing, "within what is printed")
-        return Judgement(DIFFERENT, agreeing, f"outside what is printed by {units} times its tolerance")
-    if agreeing == total:
-        return Judgement(REPRODUCED, agreeing, "all digits")
-    enough = agreeing >= FEWEST_DIGITS and 2 * agreeing >= total
-    off = f"{agreeing or 'none'} of {total} digits; off by {units} units of the last one"
-    return Judgement(REPRODUCED if enough else DIFFERENT, agreeing, off)
+        verdict = Verdict.NOT_COMPARABLE
+        evidence = reason
+    else:
+        value = [right.real, right.imag] if item.printed.imaginary or right.imag else right.real
+        if item.printed.bounds is not None:
+            outside = f"outside what is printed by {format_units(miss)} times its tolerance"
+            evidence = "within what is printed" if all_digits else outside
+        else:
+            off = f"{agreeing or 'none'} of {item.count} digits; off by {format_units(miss)} units of the last one"
+            evidence = "all digits" if all_digits else off
+    values = {
+        "right": value,
+        "right_text": "" if right is None else item.write(right),
+        "digits": agreeing,
+        "of_digits": item.count,
+        "difference_in_units": None if right is None else miss,
+    }
+    return Judged(item, values, verdict, evidence)
 
 
 def format_units(number: float) -> str:
@@ -131,14 +194,12 @@ def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> 
     """List the printed numbers. `names` has those of the components of lists, by quantity."""
     items = []
     for quantity, texts in printed.items():
-        if texts is None:
+        if isinstance(texts, str):
+            items.append(Item(quantity, quantity, 0, texts))
             continue
-        known = names.get(quantity, ())
-        for place, text in enumerate([texts] if isinstance(texts, str) else texts):
-            value = parse_printed(text)
-            assert value is not None, "the config has refused values that cannot be read"
-            suffix = "" if isinstance(texts, str) else f".{known[place] if place < len(known) else place + 1}"
-            items.append(Item(f"{quantity}{suffix}", quantity, place, value))
+        for place, text in enumerate(texts or ()):
+            component = names[quantity][place] if names.get(quantity) else place + 1
+            items.append(Item(f"{quantity}.{component}", quantity, place, text))
     return items
 
 
@@ -147,13 +208,10 @@ def match_multipliers(items: Sequence[Item], right: Sequence[complex]) -> dict[s
     left = list(right)
     matches = dict[str, complex | None]()
     for item in items:
-        if not left:
-            matches[item.name] = None
-            continue
         value = item.printed.value
-        nearest = min(left, key=lambda one: abs(one - value))
-        left.remove(nearest)
-        if item.printed.both_signs and nearest.conjugate() in left:
-            left.remove(nearest.conjugate())
+        nearest = min(left, key=lambda one: abs(one - value), default=None)
         matches[item.name] = nearest
+        for used in () if nearest is None else (nearest, nearest.conjugate())[: 1 + item.printed.both_signs]:
+            if used in left:
+                left.remove(used)
     return matches

@@ -5,45 +5,43 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.evidence.check.printed import (
-    DIFFERENT,
-    EXPLAINED,
-    NOT_COMPARABLE,
-    REPRODUCED,
-    UNEXPLAINED,
-    format_units,
-    spell_name,
-)
+from walkerlab.evidence.check.printed import Verdict, format_units, spell_name
 from walkerlab.labels import add_unit, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section, stage_section
 from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 
 Row = Mapping[str, Any]
-TONES: Mapping[str, Tone] = {REPRODUCED: "good", DIFFERENT: "bad", NOT_COMPARABLE: "plain"}
+TONES: Mapping[str, Tone] = {
+    Verdict.INPUT: "given", Verdict.REPRODUCED: "good", Verdict.EXPLAINED: "fair", Verdict.CONTRADICTED: "bad",
+    Verdict.DIFFERENT: "bad", Verdict.NOT_REPRODUCED: "plain", Verdict.NOT_COMPARABLE: "plain",
+}  # fmt: skip
+"""Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
 MANY_UNITS = 1e5
 LONGEST_LIST = 2  # angles and rates that are listed one by one
 COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),
     Column("right", "right_text", numeric=True),
-    Column("digits that agree", lambda row: digits_of(row) if row["right_text"] else ""),
+    Column("digits that agree", lambda row: agreeing_digits(row) if row["right_text"] else ""),
     Column("verdict", lambda row: Cell(verdict_of(row), TONES[row["verdict"]])),
 )
 
 
 def is_short(row: Row) -> bool:
     """Whether a value is reproduced, but not in all of its digits."""
-    return bool(row["verdict"] == REPRODUCED and row["digits"] < row["of_digits"])
+    return bool(row["verdict"] == Verdict.REPRODUCED and row["digits"] < row["of_digits"])
 
 
-def digits_of(row: Row) -> str:
+def agreeing_digits(row: Row) -> str:
+    if row["printed"].startswith(("<", ">")):
+        return ""
     agreeing = f"{row['digits']} of {row['of_digits']}"
     return f"{agreeing}, off by {format_units(row['difference_in_units'])} units" if is_short(row) else agreeing
 
 
 def verdict_of(row: Row) -> str:
-    return f"{REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
+    return f"{Verdict.REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
 
 
 def answer(summary: Row) -> list[str | Table]:
@@ -69,29 +67,27 @@ def source_of(source: Row) -> str:
 def headline(summary: Row) -> str:
     """Return a sentence that states whether the printed gait is right and, if known, why not."""
     rows: Sequence[Row] = summary["values"]
-    wrong = [row for row in rows if row["verdict"] == DIFFERENT]
     explanations = summary["explanations"]
     finding = summary["finding"]
-    if finding == NOT_COMPARABLE:
+    cause = follow(explanations[0], rows) if len(explanations) == 1 else ""
+    verdicts = [row["verdict"] for row in rows]
+    if finding == Verdict.NOT_COMPARABLE:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
-    if finding == REPRODUCED:
-        compared = [row for row in rows if row["verdict"] == REPRODUCED]
-        short = [row for row in compared if is_short(row)]
+    if finding == Verdict.REPRODUCED:
+        compared = count(verdicts.count(Verdict.REPRODUCED), "printed value")
+        short = sum(map(is_short, rows))
         if not short:
-            return f"Right: {count(len(compared), 'printed value')} reproduced to the last digit."
-        some = f"{len(short)} of {count(len(compared), 'printed value')}"
-        verb = "agrees" if len(short) == 1 else "agree"
-        return f"Reproduced, but not to the last digit: {some} {verb} in fewer digits than are printed."
-    if finding == EXPLAINED and len(explanations) == 1:
-        return f"Explained: {follow(explanations[0], rows)}."
-    if finding == EXPLAINED:
-        return f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
-    assert finding == UNEXPLAINED
+            return f"Right: {compared} reproduced to the last digit."
+        verb = "agrees" if short == 1 else "agree"
+        return f"Reproduced, but not to the last digit: {short} of {compared} {verb} in fewer digits than are printed."
+    if finding == Verdict.EXPLAINED:
+        many = f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
+        return f"Explained: {cause}." if cause else many
     if len(rows) == 1:
         return "Different, unexplained: the printed value differs, and one value is too little to find the cause."
-    what = f"{len(wrong)} of {len(rows)} printed values differ"
-    if len(explanations) == 1:
-        return f"Different, partly explained: {follow(explanations[0], rows)}."
+    if cause:
+        return f"Different, partly explained: {cause}."
+    what = f"{verdicts.count(Verdict.DIFFERENT)} of {len(rows)} printed values differ"
     if explanations:
         return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
     return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."
@@ -128,8 +124,8 @@ def remarks(summary: Row) -> Iterator[str]:
         yield summary["undecided"]
     if near := summary["closest"]:
         yield (
-            f"Closest comes a {near['kind']}: if {near['what']}, the largest difference falls from "
-            f"{number(near['without_in_units'], 2)} to {number(near['miss_in_units'], 2)} units of a last digit."
+            f"The nearest candidate is a {near['kind']}: if {near['what']}, the largest difference falls from "
+            f"{number(near['without_in_units'], 2)} to {number(near['miss_in_units'], 2)} units of the last digit."
         )
     yield from state_remarks(summary)
     if gait := summary["nearest_gait"]:
@@ -166,8 +162,10 @@ def state_remarks(summary: Row) -> Iterator[str]:
             yield f"It would be periodic with {' or '.join(changes)}."
     broken = [each for each in summary["momenta"] if not each["conserved"]]
     if broken:
-        listed = join_words([f"{each['about']} ({number(each['residual'], 3)} {each['unit']})" for each in broken])
+        changes = [f"{each['about']} by {number(each['residual'], 3)} {each['unit']}" for each in broken]
         kept = [each["about"] for each in summary["momenta"] if each["conserved"]]
-        fine = f"; that of {join_words(kept)} is conserved" if kept else ""
-        before = broken[0]["before"]
-        yield f"Over the heel strike before it ({before}), angular momentum changes: {listed}{fine}."
+        fine = f" That of {join_words(kept)} is conserved." if kept else ""
+        yield (
+            f"The heel strike before this state ({broken[0]['before']}) changes the angular momentum of "
+            f"{join_words(changes)}.{fine}"
+        )

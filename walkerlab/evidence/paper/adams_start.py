@@ -56,7 +56,7 @@ class AdamsWalk:
 
 
 def adams_start(walker: RigidModel, state: State) -> AdamsStart:
-    """Walk one step of the rigid model from `state`, the ADAMS start of Table 2."""
+    """Simulate one step of the rigid model from `state`, the ADAMS start of Table 2."""
     walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
     time = walk.samples.time_s
@@ -82,9 +82,10 @@ def adams_start(walker: RigidModel, state: State) -> AdamsStart:
 def adams_walk(
     walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
 ) -> AdamsWalk:
-    """Walk the contact model from the ADAMS start of Table 2: its stance angle and velocities, on the walker's slope.
+    """Simulate the contact model from the ADAMS start of Table 2: its stance angle and velocities, on the walker's
+    slope.
 
-    walk     function that walks the contact model from a rigid start state, with samples
+    walk     function that simulates the contact model from a rigid start state, with samples
     terrain  terrain of the contact model, as named in the config
     """
     _, theta_2, omega_1, omega_2 = adams_start_as_printed()

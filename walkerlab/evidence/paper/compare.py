@@ -29,7 +29,7 @@ from walkerlab.evidence.paper.measured import (
 )
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
 from walkerlab.evidence.paper.recorded import characteristics_of, compare_recorded, stored_energy
-from walkerlab.evidence.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
+from walkerlab.evidence.paper.rows import VERDICTS, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.evidence.paper.study import study_the_paper
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
@@ -67,7 +67,7 @@ COLUMN_NAMES = {
     "percent_of_matlab": "difference in percent of the MATLAB value",
     "percent_of_adams": "difference in percent of the ADAMS value",
     "printed": "as printed",
-    "verdict": ", ".join(NumberVerdict),
+    "verdict": ", ".join(VERDICTS),
     "evidence": "evidence",
 }
 """Long names of the columns in the paper's numbers and tables."""
@@ -106,7 +106,7 @@ def compare_with_paper(
     measured = measure(config, inputs, motion)
     judged_rows = tuple(paper_rows(measured, study))
     paper_errata = errata(study)
-    rows = [vars(row) for row in judged_rows]
+    rows = [each.row for each in judged_rows]
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
     groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(paper_errata, labels_of(Erratum))}
@@ -212,7 +212,7 @@ def list_omissions(inputs: Mapping[str, Content], measured: Measured) -> list[di
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
     """Build a group with the numbers of the paper and of the models.
 
-    A model's column holds only rows with a value; its own coordinate lists these rows. Text columns hold all rows.
+    The column of a model has only the rows with a value, which its coordinate lists. Text columns have all rows.
 
     names  symbols of the rows, if they have any
     """

@@ -14,7 +14,7 @@ from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
-from walkerlab.pipeline.stages.walk import last_step, numbers_of
+from walkerlab.pipeline.stages.walk import last_step, summarise_walk
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.omissions import omission
 from walkerlab.scene.parts import assembly_of
@@ -34,7 +34,7 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Walk up to 20 steps from a gait with each knee release.
+    """Simulate up to 20 steps from a gait with each knee release.
 
     Returns None for walkers without knees, with a push-off or with legs that differ.
     """
@@ -64,6 +64,6 @@ def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
         "steps": steps,
         "of": CONTACT_STEPS,
         "knee_strike_s": None,
-        **last_step(numbers_of(walk)),
+        **last_step(summarise_walk(walk)),
         "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()} if steps else None,
     }

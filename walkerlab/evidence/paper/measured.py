@@ -84,7 +84,7 @@ class RigidMeasurements:
 
 
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
-    """Walk five cycles from a gait's fixed point. Energies are measured from the current stance foot."""
+    """Simulate five cycles from the fixed point of a gait. Energies are measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * PAPER_CYCLES, sampled=True)
     assert walk.samples is not None

@@ -1,11 +1,11 @@
 """Numbers printed in the paper, with their sources, and the walker that they describe."""
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
-from walkerlab.config.check import Digits, agreement, parse_printed
+from walkerlab.config.check import agreement
 from walkerlab.config.contact import MM_PER_M, Contact
+from walkerlab.evidence.check.printed import PrintedNumber
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 
@@ -14,24 +14,17 @@ COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
 
 
 @dataclass(frozen=True)
-class Printed:
+class Printed(PrintedNumber):
     """Number printed in the paper."""
 
     where: str  # equation, table, figure or section
     quantity: str
     unit: str
-    text: str  # text as printed, which shows the last significant digit
-
-    @cached_property
-    def digits(self) -> Digits:
-        """The number, read as a printed gait's is. Its bounds and unit of percent are left out."""
-        printed = parse_printed(self.text.rstrip("% "))
-        assert printed is not None
-        return printed.real
+    text: str
 
     @property
-    def value(self) -> float:
-        return self.digits.value
+    def about(self) -> dict[str, Any]:
+        return {"where": self.where, "quantity": self.quantity, "unit": self.unit}
 
     @property
     def rounding(self) -> tuple[float, float]:
@@ -112,7 +105,7 @@ TABLE_3: Final = tuple(
     for name, quantity, unit, matlab, adams in (
         ("t_left", "left step period", "s", "0.60", "0.59"),
         ("t_right", "right step period", "s", "0.79", "0.77"),
-        ("t_cycle", "one cycle period", "s", "1.39", "1.38"),
+        ("t_cycle", "stride period", "s", "1.39", "1.38"),
         ("v_com", "average velocity", "m/s", "0.0246", "0.0248"),
         ("E_avg", "average mechanical energy (5 steps)", "J", "150.13", "150.14"),
     )

@@ -4,10 +4,10 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Literal
 
 from walkerlab.config.contact import MM_PER_M
+from walkerlab.evidence.check.printed import Judged, Verdict
 from walkerlab.evidence.paper import printed
 from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
 from walkerlab.evidence.paper.measured import EQUATION_SETS, PAPER_CYCLES, Measured
@@ -19,59 +19,43 @@ from walkerlab.physics.hybrid.comparison import Quantity
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
-class NumberVerdict(StrEnum):
-    """Verdict on a printed value."""
-
-    INPUT = "input"  # used as given
-    REPRODUCED = "reproduced"  # agrees to the printed digits
-    EXPLAINED = "explained"  # does not agree, for a measured reason or because the scene is not the paper's
-    CONTRADICTED = "contradicted"  # contradicted by other values of the paper; overrides all other verdicts
-    NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
-
-
-@dataclass(frozen=True)
-class JudgedNumber:
-    """Printed value and the models' values, in the printed unit, or None if a model has no such value."""
-
-    where: str
-    quantity: str
-    unit: str
-    printed: str
-    as_printed: float | None
-    corrected: float | None
-    contact: float | None
-    verdict: str
-    evidence: str
-
-
-INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
+VERDICTS = (
+    Verdict.INPUT,
+    Verdict.REPRODUCED,
+    Verdict.EXPLAINED,  # for a measured reason, or because the scene is not the paper's
+    Verdict.CONTRADICTED,  # overrides all other verdicts
+    Verdict.NOT_REPRODUCED,  # includes values of ADAMS, which was not run
+)
+"""Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
 """Model whose scene must equal the paper's for a mismatch to count; "any" if the paper's values alone decide."""
 
 
-def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
+def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
     """Count values by verdict. `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
-    by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
-    return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
+    return {
+        **{verdict.value: verdicts[verdict] for verdict in VERDICTS},
+        "refuted": verdicts[Verdict.CONTRADICTED] + verdicts[Verdict.NOT_REPRODUCED],
+    }
 
 
-def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
+def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
     """Yield all rows in the paper's order."""
     judge = Judge(measured, study)
     contact = measured.contact
     walker = measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
-        yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
+        yield judge.judge_input(entry, float(getattr(walker, parameter)), "rigid")
     for coordinate, entry in enumerate(printed.X_P):
         yield judge.fixed_point(entry, coordinate)
     yield judge.eigenvalue()
-    yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
-    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
+    yield judge.judge_input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.judge_input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
-        yield judge.input(entry, value, "contact", prose("evidence.unitless", contact))
-    yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
-    yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
+        yield judge.judge_input(entry, value, "contact", prose("evidence.unitless", contact))
+    yield judge.judge_input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
+    yield judge.judge_input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
     for coordinate, row in enumerate(printed.TABLE_2):
         yield judge.adams_start(row.adams, coordinate)
@@ -96,10 +80,10 @@ class Judge:
         entry: Printed,
         rigid: Mapping[str, float],
         contact: float | None,
-        verdict: NumberVerdict,
+        verdict: Verdict,
         scene: Scene,
         evidence: str,
-    ) -> JudgedNumber:
+    ) -> Judged:
         """Build the row of a printed value. `rigid` holds the rigid model's values by set of equations.
 
         verdict  verdict on the paper's own scene; replaced if another value of the paper contradicts the printed one
@@ -107,17 +91,16 @@ class Judge:
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
         if (contradiction := contradictions().get(entry)) is not None:
-            verdict = CONTRADICTED
+            verdict = Verdict.CONTRADICTED
             scene = "any"
             evidence = f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
             evidence += f" The verdict is about the paper's own numbers, not this scene ({differs})."
-        elif differs and verdict not in (INPUT, REPRODUCED):
-            verdict = EXPLAINED
+        elif differs and verdict not in (Verdict.INPUT, Verdict.REPRODUCED):
+            verdict = Verdict.EXPLAINED
             evidence = f"Not the paper's scene ({differs}): {evidence}"
-        about = entry.where, entry.quantity, entry.unit, entry.text
-        as_printed, corrected = map(rigid.get, EQUATION_SETS)
-        return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
+        values = {name.replace("-", "_"): rigid.get(name) for name in EQUATION_SETS}
+        return Judged(entry, {**values, "contact": contact}, verdict, evidence)
 
     @property
     def raised(self) -> list[float | None]:
@@ -129,59 +112,59 @@ class Judge:
         pairs = zip(start, gait.state, strict=True)
         return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
 
-    def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
+    def judge_input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
         """Judge a parameter of both models, or of the contact model alone."""
         rigid: dict[str, float] = dict.fromkeys(EQUATION_SETS, value) if scene == "rigid" else {}
-        verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
+        verdict = Verdict.INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else Verdict.EXPLAINED
         return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 
-    def fixed_point(self, entry: Printed, coordinate: int) -> JudgedNumber:
+    def fixed_point(self, entry: Printed, coordinate: int) -> Judged:
         values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
         agreements = {name: entry.agreement(value) for name, value in values.items()}
         text = prose("evidence.fixed_point", values, agreements)
-        return self.row(entry, values, None, verdict_if(any(agreements.values())), "rigid", text)
+        return self.row(entry, values, None, verdict_on(entry, values.values()), "rigid", text)
 
-    def eigenvalue(self) -> JudgedNumber:
+    def eigenvalue(self) -> Judged:
         entry = printed.EIGENVALUES
         radii = self.measured.spectral_radii
-        stable = bool(radii) and max(radii.values()) < entry.value
-        return self.row(entry, radii, None, verdict_if(stable), "rigid", prose("evidence.eigenvalue", radii))
+        verdict = verdict_on(entry, [max(radii.values(), default=None)])
+        return self.row(entry, radii, None, verdict, "rigid", prose("evidence.eigenvalue", radii))
 
-    def lost_balance(self) -> JudgedNumber:
+    def lost_balance(self) -> Judged:
         """Judge the loss of balance from MATLAB's initial conditions."""
         steps, outcome = self.measured.contact.from_x_p
         right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
         text = prose("evidence.lost_balance", steps, 2 * PAPER_CYCLES, outcome, short)
-        agrees = outcome != "walked" and steps == printed.LOST_BALANCE.value
-        return self.row(printed.LOST_BALANCE, {}, float(steps), verdict_if(agrees), "contact", text)
+        verdict = verdict_on(printed.LOST_BALANCE, [None if outcome == "walked" else steps])
+        return self.row(printed.LOST_BALANCE, {}, float(steps), verdict, "contact", text)
 
-    def percent(self, row: printed.StartRow, coordinate: int) -> JudgedNumber:
+    def percent(self, row: printed.StartRow, coordinate: int) -> Judged:
         """Judge a percentage of Table 2, which is arithmetic and so independent of the config."""
         entry = row.percent
-        verdict = REPRODUCED if entry.agreement(row.percent_of_matlab) else EXPLAINED
+        verdict = verdict_on(entry, [row.percent_of_matlab], Verdict.EXPLAINED)
         left_open = None if entry in contradictions() else percent_left_open(row)
         text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
         return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
 
-    def adams_start(self, entry: Printed, coordinate: int) -> JudgedNumber:
+    def adams_start(self, entry: Printed, coordinate: int) -> Judged:
         """Judge a coordinate of the ADAMS start, which is an input if the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
-        verdict = INPUT if entry.agreement(value) else NOT_REPRODUCED
+        verdict = Verdict.INPUT if entry.fits(value) else Verdict.NOT_REPRODUCED
         text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.raised[2:])
         return self.row(entry, {}, value, verdict, "contact", text)
 
-    def strides(self) -> JudgedNumber:
+    def strides(self) -> Judged:
         """Judge the five gait cycles, which the rigid model walks as well."""
         entry = printed.CYCLES_WALKED
         contact = self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         completed = contact.steps // 2
         text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
-        return self.row(entry, rigid, float(completed), INPUT, "contact", text)
+        return self.row(entry, rigid, float(completed), Verdict.INPUT, "contact", text)
 
-    def error(self) -> JudgedNumber:
+    def error(self) -> Judged:
         """Judge the largest error of Fig. 8, for angles and angular velocities together."""
         entry = printed.LARGEST_ERROR
         study = self.study
@@ -198,18 +181,17 @@ class Judge:
         text = prose("evidence.error", late, self.measured.equations, errors_by_quantity)
         way = "aligned" if "aligned" in differences else "raw"
         largest = max((max(errors[way]) for _, _, errors in errors_by_quantity if way in errors), default=None)
-        return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
+        return self.row(entry, {}, largest, Verdict.NOT_REPRODUCED, "any", text)
 
-    def step_length(self) -> JudgedNumber:
+    def step_length(self) -> Judged:
         entry = printed.STEP_LENGTH
         contact = self.measured.contact.step_length
         lengths = {name: model.step_length for name, model in self.measured.models.items()}
         longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
         text = prose("evidence.step_length", lengths, contact, longest)
-        agrees = any(entry.agreement(length) for length in lengths.values())
-        return self.row(entry, lengths, contact, verdict_if(agrees), "rigid", text)
+        return self.row(entry, lengths, contact, verdict_on(entry, lengths.values()), "rigid", text)
 
-    def velocity_difference(self) -> JudgedNumber:
+    def velocity_difference(self) -> Judged:
         """Judge the difference of the average velocities. The evidence includes the paper's own arithmetic."""
         entry = printed.VELOCITY_DIFFERENCE
         contact = self.measured.contact.table_3.v_com
@@ -225,10 +207,10 @@ class Judge:
         by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
         sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
         text = prose("evidence.velocity_difference", percentages, by_cycle, sums)
-        agrees = bool(percentages) and max(percentages.values()) < entry.value
-        return self.row(entry, percentages, None, verdict_if(agrees), "contact", text)
+        verdict = verdict_on(entry, [max(percentages.values(), default=None)])
+        return self.row(entry, percentages, None, verdict, "contact", text)
 
-    def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
+    def table_3(self, row: printed.PrintedRow) -> Iterator[Judged]:
         """Judge a row of Table 3: MATLAB's value by the rigid model, ADAMS's value by the contact model."""
         measured = self.measured
         study = self.study
@@ -240,16 +222,18 @@ class Judge:
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
-        verdict = EXPLAINED if matching_means else NOT_REPRODUCED
+        verdict = verdict_on(
+            row.matlab, rigid.values(), Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
+        )
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
-        agrees = any(row.matlab.agreement(value) for value in rigid.values())
-        yield self.row(row.matlab, rigid, contact, REPRODUCED if agrees else verdict, "rigid", text)
+        yield self.row(row.matlab, rigid, contact, verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)
-        yield self.row(row.adams, rigid, contact, verdict_if(bool(row.adams.agreement(contact))), "contact", text)
+        yield self.row(row.adams, rigid, contact, verdict_on(row.adams, [contact]), "contact", text)
 
 
-def verdict_if(agrees: bool) -> NumberVerdict:
-    return REPRODUCED if agrees else NOT_REPRODUCED
+def verdict_on(entry: Printed, values: Iterable[float | None], otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
+    """Return the verdict on a printed value that is reproduced if one of some values has all of its digits."""
+    return Verdict.REPRODUCED if any(map(entry.fits, values)) else otherwise
 
 
 Table = dict[str, dict[str, Any]]

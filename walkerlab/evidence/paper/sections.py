@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.evidence.check.section import TONES
 from walkerlab.labels import add_unit
 from walkerlab.views.report.answers import last_steps
 from walkerlab.views.report.blocks import (
@@ -18,19 +19,10 @@ from walkerlab.views.report.blocks import (
     Statements,
 )
 from walkerlab.views.report.numbers import count, number, typeset
-from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
+from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import describe_error, words
 
 Row = Mapping[str, Any]
-
-TONES: dict[str, Tone] = {
-    "input": "given",
-    "reproduced": "good",
-    "explained": "fair",
-    "contradicted": "bad",
-    "not-reproduced": "plain",
-}
-"""Appearance of each verdict on a printed value."""
 
 TEXT_SUFFIX = "_text"
 """Suffix of keys whose values are numbers in their printed form."""
@@ -144,7 +136,7 @@ def paper_section(results: Results) -> Section | None:
 
 
 def list_verdicts(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
-    """Yield the paper's values by verdict and location, and its gravest errors."""
+    """Yield the paper's values by verdict and location, and its most serious errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)

@@ -37,9 +37,9 @@ from walkerlab.pipeline.stages.walk import (
     TIME,
     count_outcomes,
     legs,
-    numbers_of,
     rigid_start,
     step_columns,
+    summarise_walk,
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, real_and_imaginary, rows_group
@@ -53,7 +53,7 @@ from walkerlab.scene.contact import (
     tolerances_of,
 )
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import scale_for_map, starts_of
+from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
@@ -68,7 +68,7 @@ WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengt
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start, which fails if no start walks.
+    """Adjust the start until the contact model walks, which fails if no start leads to walking.
 
     Raises NoAnswer if the pads need a gait that does not exist.
     """
@@ -110,7 +110,7 @@ class TuneRun:
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
         self.pins_foot = is_passive_compass(config)
-        self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
+        self.starts = build_scaled_starts(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []
@@ -180,7 +180,7 @@ class TuneRun:
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
-        """Walk the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
+        """Simulate the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
         scene = replace(self.scene, pinned=pinned)
         interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME
         return scene.walk(start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
@@ -196,7 +196,7 @@ class TuneRun:
 
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
-    quantities = numbers_of(walk)
+    quantities = summarise_walk(walk)
     return {key: quantities[key] for key in WALK_SUMMARY_KEYS}
 
 
@@ -347,7 +347,10 @@ def groups(tune: TuneRun) -> dict[str, Group]:
     stored = {"map": map_group(tune)}
     walker = tune.scene.walker
     if tune.margins:
-        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "last factor at which the start walks")}
+        labels = {
+            "name": Label("", "what is scaled"),
+            "factor": Label("1", "largest change that still leads to walking (factor)"),
+        }
         stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
     if tune.gait.gait is not None:
         stored["gait"] = gait_group(tune.gait.gait, tune.scene)

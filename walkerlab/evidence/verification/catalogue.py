@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from walkerlab.config.analyses import FATES, Case, Fate
-from walkerlab.config.fields import Block
+from walkerlab.config.fields import replace_key
 from walkerlab.config.loader import paper_config_with
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, replace_state, state_of
@@ -28,8 +28,6 @@ PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
 STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
 SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
 CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
-
-B = TypeVar("B", bound=Block)
 
 
 @cache
@@ -124,9 +122,3 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     for path, value in values.items():
         config = replace_key(config, path, value)
     return config
-
-
-def replace_key(block: B, path: str, value: Any) -> B:
-    """Return a copy of a block with the value at a dotted path replaced."""
-    name, _, tail = path.partition(".")
-    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})

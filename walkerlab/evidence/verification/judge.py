@@ -62,7 +62,7 @@ def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult
 
 
 def judge(case: Case, config: Config) -> CaseResult:
-    """Walk a case and judge it. Walks of more than `SAMPLED_STEPS` steps are not sampled."""
+    """Simulate a case and judge its walk. Walks of more than `SAMPLED_STEPS` steps are not sampled."""
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepare_start(config, case)
     if start is None:
@@ -146,7 +146,9 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Walk with other methods until one has an answer. `budget` limits right-hand sides (libraries may get fewer)."""
+    """Simulate a walk with other methods until one has an answer. `budget` limits right-hand sides (libraries may get
+    fewer).
+    """
     tried: list[str] = []
     for method in other_methods(configured):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))

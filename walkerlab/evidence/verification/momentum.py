@@ -137,8 +137,8 @@ class SwingMasses:
     def momenta(self, moving: Moving, new: bool) -> tuple[float, float]:
         """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
-        The first is the walker's about the new foothold; the second is the lifting leg's about the hip, including the
-        leg's share of coupled bodies.
+        The first is that of the walker about the new foothold. The second is that of the lifting leg about the hip,
+        including its share of coupled bodies.
 
         new  whether the pose is after heel strike, with the roles of the legs exchanged
         """
@@ -165,7 +165,7 @@ class RigidMasses:
     ) -> float:
         """Return the largest relative change of the conserved momenta over heel strikes.
 
-        push_offs  N s, of each leg
+        push_offs  impulse of the push-off of each leg (N s)
         """
         change = 0.0
         size = 1e-300

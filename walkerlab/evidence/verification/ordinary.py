@@ -58,7 +58,7 @@ class Choice:
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Walk a case by every ordinary method.
+    """Simulate a case by every ordinary method.
 
     The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
     ground that needs events (a pinned foot, or `after-mid-swing`).
@@ -132,7 +132,7 @@ def suppress_warnings() -> Iterator[None]:
 
 
 def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
-    """Walk a rigid scene with SciPy's solve_ivp at default settings, with an event function for heel strikes."""
+    """Simulate a rigid scene with SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
     y = None
     count = MAX_ORDINARY_EVALUATIONS
@@ -142,7 +142,7 @@ def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, 
 
 
 def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
-    """Walk a contact scene with SciPy's solve_ivp at default settings."""
+    """Simulate a contact scene with SciPy's solve_ivp at default settings."""
     from scipy.integrate import solve_ivp
 
     system = OnPads(place_on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
@@ -159,7 +159,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 
 def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
-    """Walk a contact scene by semi-implicit Euler with at most `cap` steps of h (s)."""
+    """Simulate a contact scene by semi-implicit Euler with at most `cap` steps of h (s)."""
     system = OnPads(place_on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()

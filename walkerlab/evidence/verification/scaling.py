@@ -39,7 +39,7 @@ def scaled_block(block: B, by: Units) -> B:
 
     values: dict[str, Any] = {}
     for name, field in type(block).model_fields.items():
-        values[name] = value(getattr(block, name), by.size_of(annotation_of(field, "unit")))
+        values[name] = value(getattr(block, name), by.natural_unit(annotation_of(field, "unit")))
     return block.model_copy(update=values)
 
 

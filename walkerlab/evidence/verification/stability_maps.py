@@ -64,7 +64,7 @@ def prepare_on_ground(
 
 
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
-    """Walk with the default method at one stiffness and stiction velocity.
+    """Simulate a walk with the default method at one stiffness and stiction velocity.
 
     Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks (in
     leg lengths, rad, pendulum times; `ERROR_MISSING` if outcome or step count differ), and the right-hand sides.
@@ -83,8 +83,8 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Walk two steps at one stiffness by semi-implicit Euler with each step size (s), and compare them with a tight
-    reference.
+    """Simulate two steps at one stiffness by semi-implicit Euler with each step size (s), and compare them with a
+    reference at a tight tolerance.
 
     Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error, in the units of `stiction_cell`.
     """

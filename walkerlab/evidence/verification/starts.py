@@ -80,7 +80,7 @@ class RigidStart(CaseStart):
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
-        """Walk a case. Only heel strikes are judged, so nothing is sampled."""
+        """Simulate a case. Only heel strikes are judged, so nothing is sampled."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches = walk.touch_time_s / pendulum_time(self.config)

@@ -70,6 +70,7 @@ class FitProblem:
         """Lower bound (quantities,) on each quantity's noise: rounding of its values, or a fraction of its size."""
         sizes = typical_sizes(self.forecast)
         resolution = self.forecast.measured.resolution
+        # Rounding to a resolution is uniformly distributed, which has this standard deviation.
         rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
         return np.maximum(NOISE_FLOOR * sizes, rounding)
 
@@ -97,7 +98,7 @@ class FitProblem:
 
 
 class FitEnd(Enum):
-    """How a fit ended. The value is the reason if it did not converge, with the maximum number of walks to insert."""
+    """How a fit ended. If it did not converge, the value is the reason, with {} for the maximum number of walks."""
 
     CONVERGED = ""
     STILL_CHANGES = "standard deviations still change"
@@ -197,6 +198,7 @@ def fit(
         if forecast.walks_taken > problem.max_walks:
             end = FitEnd.OUT_OF_WALKS
             break
+    # The errors follow from these derivatives, so they are exact unless a slightly changed walk ends early.
     data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
@@ -233,6 +235,7 @@ def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
 def average_noise(before: Noise, after: Noise) -> Noise:
     """Return the geometric mean of two measurement noises and the arithmetic mean of two process noises."""
     measurement = np.sqrt(before.measurement * after.measurement)
+    # A disturbance may have a standard deviation of zero, and a geometric mean would then stay at zero.
     return Noise(measurement, *(0.5 * (before.process + after.process)).tolist())
 
 
@@ -295,7 +298,9 @@ def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floa
     """
     steepness = 1.0 / np.sqrt(1.0 + (residuals / robust.scatter[quantity]) ** 2)
     counts = np.bincount(quantity)
+    # With x the residual in units of the scatter, psi' is (1 + x^2)^(-3/2), the third power of the steepness.
     mean, square = (np.bincount(quantity, steepness**power) / counts for power in (3, 6))
+    # Huber's correction for the share that the fit absorbs: 1 + share times var(psi') / mean(psi')^2.
     factor = (1.0 + robust.absorbed * (square / mean**2 - 1.0)) / mean
     return np.asarray(residuals * steepness * factor[quantity])
 

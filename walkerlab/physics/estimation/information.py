@@ -103,6 +103,7 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
         return information.freedom
     likeliest = basis @ (information.covariance / np.outer(information.scales, information.scales)) @ basis.T
     ratio = float(np.trace(np.linalg.solve(likeliest, averaged_covariance(fitted, basis)))) / len(basis)
+    # ratio = nu / (nu - 2), solved for nu
     return min(information.freedom, 2.0 * ratio / (ratio - 1.0)) if ratio > 1.0 else information.freedom
 
 
@@ -123,6 +124,7 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     drawn = evaluate_at(logs)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
     moved = drawn.move[:, :count] @ basis.T
+    # Law of total variance: the estimate itself moves with the standard deviations.
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
@@ -162,6 +164,7 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
         if not is_open(np.array([value, largest]))[0]:
             continue
         order = np.argsort(-np.abs(direction))
+        # The sign of a singular vector is arbitrary; the largest component is shown as a rise.
         signed = direction * np.sign(direction[order[0]])
         moved = (np.abs(direction) * information.scales > errors) & (errors > 0.0)
         parts = [(information.keys[k], float(signed[k])) for k in order if moved[k] or abs(signed[k]) >= LOADED]
@@ -182,7 +185,7 @@ def describe_combination(parts: list[tuple[str, float]]) -> str:
 def describe_reason(value: float, largest: float) -> str:
     if value <= LOST_SHARE * largest:
         return "the walk does not change with this combination"
-    return f"even a 100 % change along it moves the walk by only {value:.2g} standard deviations of the data"
+    return f"even a 100 % change moves the walk by only {value:.2g} standard deviations of the data"
 
 
 def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
@@ -195,6 +198,7 @@ def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     losses = []
     for index in range(len(quantities)):
         noise = fitted.noise.measurement.copy()
+        # With so much noise, the quantity contributes nothing.
         noise[index] *= 1e6
         without = evaluate(fitted.rows, fitted.noise._replace(measurement=noise)).information
         remaining = np.diag(basis @ marginalise(without, count) @ basis.T)

@@ -18,10 +18,14 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
+# fraction of a quantity's size; the residual of a missed heel strike is far larger
+SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
+LIMP: Final = ": a limp"  # end of the reason for a misfit of odd and even steps
+NOTABLE_ALTERNATION: Final = 3.0  # the same difference that suggests legs that differ
 PHASE_BINS: Final = 20
-UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
+# fraction of the leg length; the floor of a laboratory is rough by about 0.001
+UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
 # largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
 # it
@@ -38,13 +42,12 @@ def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
 def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
     forecast = fitted.forecast
     sizes = fitted.data.sizes
+    limp = describe_limp(fitted)
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             (name, unit), share = name_and_unit(quantity), 100.0 * noise / size
-            return (
-                "misfit",
-                f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size",
-            )
+            reason = f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size"
+            return "misfit", limp or reason
     if fitted.reason:
         return "not-converged", fitted.reason
     if fitted.noise.roughness_m > MAX_ROUGHNESS * fitted.problem.leg_length_m:
@@ -65,14 +68,33 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
                 "misfit",
                 f"the {name} of step {worst + 1} deviates by {times:.2g} times the scatter of the other steps",
             )
-        if (alternation := alternation_of(residuals)) > ALTERNATION:
-            reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
-            return "misfit", reason
+    if limp:
+        return "misfit", limp
     if forecast.measured.sampled:
         systematic = float(np.sqrt(np.nanmean(phase_means(fitted) ** 2)))
         if systematic > LARGEST_SHARE * sizes[forecast.quantities.index(LEG_ANGLE)]:
             return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
     return "fits", ""
+
+
+def alternates(fitted: Fitted) -> bool:
+    """Whether a quantity of odd and even steps differs from the model's, which a rough floor may explain, too."""
+    channels = fitted.data.residuals[: fitted.forecast.measured.count * len(fitted.forecast.channels)]
+    return any(
+        alternation_of(each) > NOTABLE_ALTERNATION for each in np.split(channels, len(fitted.forecast.channels) or 1)
+    )
+
+
+def describe_limp(fitted: Fitted) -> str:
+    """Describe by how much a quantity of odd and even steps differs from the model's, or return '' if it does not."""
+    white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
+    steps = fitted.forecast.measured.count
+    for index, quantity in enumerate(fitted.forecast.channels):
+        alternation = alternation_of(white[index * steps : (index + 1) * steps])
+        if alternation > ALTERNATION:
+            name = name_and_unit(quantity)[0]
+            return f"the {name} alternates from step to step by {alternation:.2g} standard deviations{LIMP}"
+    return ""
 
 
 def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
@@ -101,6 +123,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
     squares = float((sums**2 / counts).sum())
     freedom = max(1, counts.size - fitted.u.size)
+    # As a normal deviate, so that the limit does not depend on the number of averages.
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "

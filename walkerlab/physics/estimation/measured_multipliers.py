@@ -12,15 +12,18 @@ MIN_STEPS = 8
 REPLICATES = 400
 
 
-def spectral_radius(steps: Floats) -> Floats:
+def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     """Return the largest multiplier (...,) of the linear map that takes each step's values to the next step's.
 
     The map is that of least squares, as in the literature, so it is biased by noise.
 
-    steps  (..., steps, quantities)
+    steps   (..., steps, quantities)
+    stride  number of steps after which a gait repeats, each with its own mean
     """
-    before, after = steps[..., :-1, :], steps[..., 1:, :]
-    before, after = (each - each.mean(axis=-2, keepdims=True) for each in (before, after))
+    before, after = steps[..., :-1, :].copy(), steps[..., 1:, :].copy()
+    for each in (before, after):
+        for first in range(stride):
+            each[..., first::stride, :] -= each[..., first::stride, :].mean(axis=-2, keepdims=True)
     # In units of its own scatter, no quantity is lost in the pseudo-inverse, whatever its unit.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     before, after = before / scale, after / scale
@@ -38,6 +41,7 @@ def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | Non
     fitted_radius  spectral radius of the fitted walker
     """
     forecast = fitted.forecast
+    # The seed is fixed, so that the same walk always gives the same error.
     rng = np.random.default_rng(0)
     count = forecast.measured.count
     channels = len(forecast.channels)
@@ -51,6 +55,7 @@ def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | Non
     noise = fitted.noise.measurement[forecast.quantity]
     disturbed = (rng.normal(size=(REPLICATES, spread.size)) * spread) @ fitted.data.G.T
     replicates = fitted.predicted.values + disturbed + rng.normal(size=(REPLICATES, noise.size)) * noise
-    plain = float(spectral_radius(reshape_by_step(forecast.values)))
-    simulated = spectral_radius(reshape_by_step(replicates))
+    stride = forecast.walks.stride
+    plain = float(spectral_radius(reshape_by_step(forecast.values), stride))
+    simulated = spectral_radius(reshape_by_step(replicates), stride)
     return MeasuredRadius(plain, plain + fitted_radius - float(simulated.mean()), float(simulated.std(ddof=1)))

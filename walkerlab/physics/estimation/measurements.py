@@ -27,6 +27,7 @@ class MeasuredWalk:
     angles_rad: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     # sum of both legs' angles from the slope's normal at heel strikes; not zero if slope or sensors are off
     touch_sum_rad: float = 0.0
+    first_leg: int | None = None  # leg (1 or 2) that swings in the first step; None if unknown
     resolution: Mapping[str, float] = field(default_factory=dict)  # smallest decimal place of quantities, in SI units
 
     @property

@@ -161,6 +161,7 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     factor = np.linalg.cholesky(joint)
     white = factor[..., count:, :count]
     diagonal = np.diagonal(factor, axis1=-2, axis2=-1)[..., :count]
+    # A reduced row stands for several values, each of which contributes the logarithm of its noise.
     log_determinant = 2.0 * (np.log(deviations) @ rows.counts + np.log(diagonal).sum(axis=-1))
     by_data = white @ white.swapaxes(-1, -2)
     # Without priors: a prior that contradicts the data says nothing about the noise.
@@ -314,6 +315,7 @@ def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
     """
     scale = 1.0 / noise.measurement[data.quantity]
     U, s, _ = np.linalg.svd(data.G * data.spread(noise) * scale[:, None], full_matrices=False)
+    # (1 + U s^2 U^T)^(-1/2) = 1 - U (1 - 1 / sqrt(1 + s^2)) U^T
     shrink = 1.0 - 1.0 / np.sqrt(1.0 + s**2)
 
     def whiten(values: Floats) -> Floats:

@@ -43,6 +43,8 @@ KEPT_PREDICTIONS: Final = 16
 class WalkMap(Protocol):
     """Walks of a family of walkers from the section. Like `step_map.StepMap`, but with several parameters."""
 
+    stride: int  # number of steps after which the map repeats: 2 for legs that differ
+
     def step(self, z: Floats, p: Any) -> MappedStep:
         """Take a step from z (d,), with its derivative."""
 
@@ -179,10 +181,10 @@ class Forecast:
     def differentiate(
         self, u: Floats, heights_m: Floats, exact: bool, disturbed: bool = True
     ) -> tuple[Floats, Floats] | None:
-        """Return derivatives for the unknowns, (values, unknowns), and for disturbances, (values, heights + kicks).
+        """Return derivatives with respect to unknowns (values, unknowns) and disturbances (values, heights + kicks).
 
         exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
-        disturbed  whether to differentiate by the disturbances as well
+        disturbed  whether to differentiate with respect to the disturbances, too
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         prediction = self.predict(u, heights_m)
@@ -206,6 +208,7 @@ class Forecast:
 
         if exact:
             return derivative(values, SAMPLED_STEP if self.measured.sampled else EXACT_STEP)
+        # During the search, differences are one-sided: they cost one walk instead of two.
         here = values(0.0)
         ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
@@ -253,11 +256,13 @@ class Forecast:
             return None
         angles = prediction.angles_rad
         count = self.measured.count
+        # A sample outside the walk is taken at its nearest end, whatever its time.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
         moves = np.concatenate(
             (*self._step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1]))
         )
+        # The model's time of a sample is its measured time divided by the clock's rate.
         clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
         by_name = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))

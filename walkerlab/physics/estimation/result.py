@@ -34,6 +34,25 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class LegDifference:
+    """Leg 2's value of an estimated key minus leg 1's, in the unit of the key."""
+
+    key: str
+    value: float
+    standard_error: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class FirstLeg:
+    """Leg that swings in the first step, and how certain that is."""
+
+    leg: int
+    by: Literal["statement", "likelihood", "guess"]  # stated by file or config, decided by the data, or undecided
+    likelihood_gain: float | None  # log-likelihood minus that with the other leg first; None unless both were fitted
+
+
+@dataclass(frozen=True)
 class Pull:
     """How hard the data pull an estimate against a bound, or against a prior."""
 
@@ -129,6 +148,10 @@ class Identification:
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
     sensitivities: tuple[EstimateSensitivity, ...]  # to parameters that are not estimated
     measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
+    leg_differences: tuple[LegDifference, ...] = ()  # of estimated keys of leg 2
+    first_leg: FirstLeg | None = None  # None for equal legs
+    # differences if the other leg swings first, unless the data decide between them
+    other_differences: tuple[LegDifference, ...] = ()
 
     @property
     def verdict(self) -> ModelFit:

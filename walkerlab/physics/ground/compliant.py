@@ -60,15 +60,18 @@ def contact_walker(
     """
     rules = knee_rules or KneeRules()
     check_walkable(assembly)
+    # All forms are assembled beforehand: a walk only picks another record when a knee locks or a foot is released.
     forms = np.zeros((2, 4), FORM)
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
     forms["has_knee"] = [k < len(assembly.knees) for k in range(2)]
     for pinned, root in enumerate((about_centre(assembly), about_foot(assembly, pinned_foot))):
         for locked in range(4):
+            # Bit k of a form's index says that knee k is locked, as in `locked_knees`.
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
             fill(forms[pinned, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
     legs = leg_bodies(assembly)
+    # Merging bodies renumbers them, so the hip's two bodies are looked up in each form.
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
@@ -94,6 +97,7 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
     ball = assembly.feet[foot]
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
+    # The levers between two points are the difference of their levers from a third, here the centre of mass.
     feet = [d - from_centre[foot] for d in from_centre]
     hip = hip_levers(assembly, from_centre[0]) - from_centre[foot]
     return Root(tree, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
@@ -131,6 +135,8 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     """Fill a form with constants about a root. If `merges`, each knee in `locked` makes thigh and shank one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
+    # A compliant stop latches at a small angle. Its thigh and shank keep that angle, so they cannot be one body: a row
+    # of E makes the shank turn with its thigh.
     one_with = straight if merges else {}
     separate = [body for body in range(len(assembly.bodies)) if body not in one_with]
     onto = [separate.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
@@ -144,11 +150,13 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
         form[name] = value
     merged = root.tree.merge_bodies(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
     form["mass"] = merged.pop("mass")
+    # A form has room for MAX_BODIES; its constants fill the first entries of each axis.
     for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
+        # A leg without a knee names its body twice, so its extension is always zero.
         rigid = [onto[body] for body in leg_bodies(assembly)[len(knees) :, 0]]
         form["hinges"][FIRST_KNEE:] = [
             *((onto[shank], onto[thigh]) for thigh, shank in knees),

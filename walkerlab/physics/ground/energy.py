@@ -30,6 +30,8 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
     omega = y[half + form.places : 2 * half]
     sines_cosines(form, y, s, c)
     add_inertia(form, form.bodies, s, c, omega, M, r)
+    # About the centre of mass, the energies of translation and rotation add without a coupling term. A pinned form has
+    # no translation.
     for i in range(form.places):
         total += form.mass * (y[half + i] * y[half + i])
     return 0.5 * total + tree.kinetic_energy(form.bodies, M, omega)
@@ -57,6 +59,7 @@ def total_energy(system: OnGround, y: Any) -> float:
     """Compute the mechanical energy (J): kinetic, elastic, and potential relative to a fixed origin."""
     total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
     for foot in range(2):
+        # A foot without ground may be below the surface, as a scuffing foot is, and stores nothing there.
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
     springs, stops = hinge_energies(system, y)
@@ -73,6 +76,8 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     sines_cosines(system.form, y, s, c)
     push = push_on(system, t, foot, s, c)
     motion = foot_motion(system.form, foot, s, c, y)
+    # The push acts on the foot's material, so its power takes the slip velocity, not the speed of the rolling contact
+    # point.
     return push.along * motion.slip + push.upward * motion.vertical_velocity
 
 

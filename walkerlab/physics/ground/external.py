@@ -19,6 +19,7 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]
     for k in range(n):
+        # The other program measures angles from the slope's normal, the state has them from the vertical.
         y[2 + k], y[4 + n + k] = -slope, 0.0
         for j in range(chain.shape[1]):
             y[2 + k] += chain[k, j] * q[2 + j]
@@ -56,6 +57,7 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
         forces[0] += force[0]
         forces[1] += force[1]
     add_torques(system, y, torques)
+    # By virtual work, torques on absolute angles act on the relative ones through the transpose of `chain`.
     for j in range(chain.shape[1]):
         total = 0.0
         for k in range(chain.shape[0]):

@@ -11,8 +11,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
+import numpy as np
+
 from walkerlab.physics.ground.smooth_step import smooth_step
 from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
+
+SLOPE_SAMPLES = 101  # slip velocities in each of the rising and the falling part
 
 
 class FrictionLaw(Protocol):
@@ -106,9 +110,12 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
     v = abs(slip)
     v_s = law.stiction_velocity
     if v < v_s:
+        # One cubic, odd in the slip, covers both directions. It falls from mu_s to -mu_s, because friction opposes
+        # slip.
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
         return mu, slope
     mu, slope = smooth_step(v, v_s, law.static, law.friction_velocity, law.dynamic)
+    # The sign of the force and the derivative of |slip| are opposite on both sides, so the derivative is always -slope.
     return (-mu if slip > 0.0 else mu), -slope
 
 
@@ -120,6 +127,8 @@ def coulomb_switching_count(law: Coulomb) -> int:
 
 @sample_switching.case(Coulomb)
 def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int, j: int) -> None:
+    # These are smooth in the slip. |slip| - v_s would have a kink at zero, which the polynomials of events.py cannot
+    # follow.
     values[first, j] = slip - law.stiction_velocity
     values[first + 1, j] = slip + law.stiction_velocity
     values[first + 2, j] = slip - law.friction_velocity
@@ -162,5 +171,11 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Return an upper bound on the coefficient's change over a range `slip` (m/s), from its slope at zero slip."""
-    return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))
+    """Return an upper bound on the coefficient's change over a range `slip` (m/s)."""
+    if law.largest == 0.0:
+        return 0.0
+    # The coefficient may fall to its sliding value more steeply than it rises.
+    rise = np.linspace(0.0, law.rising_until, SLOPE_SAMPLES)
+    fall = np.linspace(law.rising_until, law.sliding_from, SLOPE_SAMPLES)
+    steepest = max(abs(friction_coefficient(law, float(v))[1]) for v in (*rise, *fall))
+    return float(min(2.0 * law.largest, slip * steepest))

@@ -105,6 +105,7 @@ def hinge_powers(system: OnGround, y: Any) -> tuple[float, float]:
         angle, rate = angle_at(system, row, y)
         if is_sprung(system.form, row):
             law = hinge_torque(hinge_law(system.form, row), angle, rate)
+            # The spring's part is stored, not supplied: `hinge_energies` counts it.
             supplied += (law.elastic - law.resistance) * rate
         if is_stopping(system, row):
             stop = hinge_torque(system.stop, angle, rate)

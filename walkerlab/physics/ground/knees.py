@@ -11,7 +11,9 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-MIN_FLEXION = 0.01  # rad, flexion that a released knee must exceed before it can lock again
+# rad, flexion that a released knee must exceed before it can lock again. At its release a knee is straight to rounding,
+# and would lock again at once.
+MIN_FLEXION = 0.01
 
 
 class IdealLock(NamedTuple):
@@ -66,12 +68,15 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     x = np.array(x, float)
     n = int(whole.bodies)
     p = int(whole.places)
+    # The bodies' rates are the last n entries, with and without coordinates of the root.
     rates = x.size - int(whole.bodies)
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)
+    # A merged body shares the row of its group, whose column is that of the group's first body.
     E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
     pairs = (whole.A[:n, :n], whole.B[:n, :n])
     arms = (whole.arm_x[:n], whole.arm_y[:n])
+    # The impulse in the knee moves neither the centre of mass nor a pinned foot, so the root counts as fixed: radius 0.
     tree = RootedTree(*pairs, *arms, whole.mass, 0.0, whole.slope)
     x[rates:], lost, after[rates:] = lock(tree, E, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
     return Locked(x, lost, after)

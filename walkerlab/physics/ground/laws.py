@@ -50,6 +50,7 @@ def missing_members(law: type, kind: LawKind) -> list[str]:
     """List what a law's class lacks: members of its protocol, and registered cases of functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
+    # A law with one of these functions needs the others: events that are counted must also be sampled.
     together = kind.together if any(law in function for function in kind.together) else ()
     cases = [function for function in (*kind.required, *together) if law not in function]
     return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]

@@ -28,6 +28,7 @@ from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 @block.case(OnGround)
 def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
+    # Forms differ in size, but each has as many rates as coordinates, so blocks of two always fit.
     return (0.0, 0.0)
 
 
@@ -51,6 +52,8 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
     F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
+        # Virtual work: per unit rate of body k, the foot's lowest material point moves by rolling - U along the slope
+        # and by F normal to it.
         r[k] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
     return along, normal
 
@@ -68,6 +71,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     half = half_size(form)
     for k in range(n):
         r[k] = 0.0
+    # About the centre of mass gravity has no torque; `ground_derivative` adds its acceleration.
     if form.places == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
@@ -117,6 +121,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
         return 0.0, 0.0, 1.0 if moves else 0.0
     if moves:
         return 0.0, -F[k], form.rolling[foot, k] - U[k]
+    # From here on: dF/dtheta = -U and dU/dtheta = F.
     omega = y[half + p + k]
     return -F[k], omega * U[k], -omega * F[k]
 
@@ -148,6 +153,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
             by_j = force.normal.by_penetration * deeper + force.normal.by_rate * deeper_rate
             add_column(form, foot, j, force.coefficient * by_j + force.by_slip * faster, by_j, F, U, J)
     for k in range(form.bodies):
+        # The arm of the force turns with the body: d(rolling - U)/dtheta = -F and dF/dtheta = -U.
         J[half + p + k, p + k] -= along * F[k] + normal * U[k]
         if pushed:
             by_angle = push_gradient(form, push, foot, s, c, k)
@@ -196,7 +202,8 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     solve_motion(system, t, y, s, c, M, alpha)
-    for k in range(n):  # row k: angular accelerations due to a unit torque on body k
+    # row k: angular accelerations due to a unit torque on body k
+    for k in range(n):
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
         solve_linked(form.E[0], n, M, by_torque[k])
@@ -205,6 +212,8 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])
     for j in range(2 * half):
         for k in range(n):
+            # M d alpha = d r - dM alpha. The rows of J hold the right-hand side so far, and `by_torque` is the inverse
+            # of M.
             alpha[k] = J[half + p + k, j]
         for k in range(n):
             total = 0.0

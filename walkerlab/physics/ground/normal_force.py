@@ -113,6 +113,7 @@ def impact_release_function(law: Impact, penetration: float, penetration_rate: f
     if d >= full:
         return (law.stiffness * d**law.exponent + law.damping * penetration_rate) / full**power
     spring = law.stiffness * (d ** (law.exponent - power) if law.exponent > power else 1.0)
+    # STEP is c_max (d / d_max)^2 (3 - 2 d / d_max), so d^2 divides out.
     damping = law.damping * (3.0 - 2.0 * d / full) / full**2
     return spring + damping * penetration_rate * (d ** (2.0 - power) if power < 2.0 else 1.0)
 

@@ -13,11 +13,14 @@ from walkerlab.physics.kernels import kernel_part
 
 @kernel_part
 def pulse_force(system: OnGround, t: float, foot: int) -> float:
+    # A walk starts in the state after a strike, which contains that strike's push-off: the first pulse comes with the
+    # first touch.
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     u = (t - system.progress.last_touch) / system.form.push_off_duration
     if u <= 0.0 or u >= 1.0:
         return 0.0
+    # The integral of u^2 (1 - u)^2 is 1/30.
     return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_offs[foot] / system.form.push_off_duration
 
 
@@ -66,5 +69,6 @@ def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: i
     magnitude.
     """
     forward, upward = lever_to_hip(form, foot, s, c, k)
+    # Force per length, times the angle by which the line from foot to hip turns for a unit turn of body k.
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
     return -turned * push.above, turned * push.ahead

@@ -14,7 +14,8 @@ from walkerlab.physics.kernels import kernel_part
 
 REMOTE_EDGE = 1e9  # m, further than any walk gets
 STANCE_FOOT = 1  # foot that carries the first step
-EVEN = np.zeros(1)  # writable, like unpickled arrays, because kernels would be compiled again for a read-only array
+# writable, like unpickled arrays, because kernels would be compiled again for a read-only array
+EVEN = np.zeros(1)
 
 
 class Terrain(NamedTuple):
@@ -55,6 +56,7 @@ def foothold_height(terrain: Terrain, foothold: int) -> float:
 
 @kernel_part
 def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
+    # Footholds are counted from pad 0 of the stance foot's lane. The other lane's pad 0 is `apart` footholds further.
     apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.pitch
     return foothold_height(terrain, cell + math.floor(apart + 0.5))
 

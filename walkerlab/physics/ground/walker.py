@@ -224,6 +224,7 @@ def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMot
     omega = y[half + form.places : 2 * half]
     ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
     for k in range(n):
+        # Turning counter-clockwise moves the lowest material of the ball downhill relative to its centre.
         slip += omega[k] * form.rolling[foot, k]
     height += above - form.radius[foot]
     return FootMotion(along + ahead, height, slip + ahead_rate, vertical_velocity + above_rate)
@@ -297,6 +298,7 @@ def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
+    # The arms are first moments, so they lead from the hinge to the centre of mass once divided by the mass.
     whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass
     whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
 

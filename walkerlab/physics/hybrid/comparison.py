@@ -54,6 +54,7 @@ class Motion:
         ends = (*self._first_samples[1:], self.time.size)
         pieces = []
         for first, end in zip(self._first_samples, ends, strict=True):
+            # A single sample cannot be interpolated, so it is joined with the one before it.
             span = slice(first, end) if end - first > 1 else slice(max(first - 1, 0), first + 1)
             time = self.time[span]
             velocity = self.velocity[span]
@@ -120,6 +121,7 @@ def add_strike_samples(motion: Motion) -> Motion:
     ]
     for strike in motion.knee_strikes:
         index = np.searchsorted(motion.time, strike)
+        # Extrapolation from both sides needs three samples on each.
         if 3 <= index <= motion.time.size - 3 and strike not in motion.time:
             added += [(strike - side, slice(index - 3, index)), (strike, slice(index, index + 3))]
     strikes = np.concatenate((motion.step_ends, motion.knee_strikes))
@@ -192,6 +194,7 @@ def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.
         others = reference.knee_phases(step)
         if strikes.size == others.size:
             for pair in zip(strikes, others, strict=True):
+                # This clears entries of `clear`, of which `row` is a view.
                 row &= (phases < min(pair)) | (phases > max(pair))
     return clear
 
@@ -232,6 +235,7 @@ def farthest_distance(points: Array, polyline: Array) -> float:
     """Compute the largest distance from one of the points (n, 2) to the polyline (m, 2)."""
     # x and y are kept in separate arrays: a sum over an axis of length two is several times slower.
     (start_x, start_y), (edge_x, edge_y) = polyline[:-1].T, np.diff(polyline, axis=0).T
+    # A repeated point makes an edge of length zero.
     length_squared = np.maximum(edge_x**2 + edge_y**2, np.finfo(float).tiny)
     largest = 0.0
     for first in range(0, len(points), BLOCK_POINTS):

@@ -76,6 +76,7 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
     stance = walk_state.progress.stance
     values[FALL, node] = hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
     away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
+    # Squared, so that one smooth function covers slides in both directions.
     values[SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
     for knee in range(2):
         values[EXTENSION + knee, node] = extension(form, knee, y)
@@ -92,6 +93,7 @@ def sample_foot(
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + RELEASE, j] = release_function(system.normal, -motion.height, -motion.vertical_velocity)
+    # A law with a single formula has no such penetration. Infinity then spans no zero.
     values[first + FULL_DAMPING, j] = motion.height + switching_penetration(system.normal)
     sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
@@ -110,6 +112,7 @@ def earliest_crossing(
         row = foot * PER_FOOT
         # a foot in the air has no force to switch; switching after a touch belongs to the next solver step
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + HEIGHT] < 0
+        # The rows of a foot begin with its height and edges; the switching points follow.
         end = row + RELEASE
         if inside and ground.frame.locate_switching and not progress.passes_switching:
             end = row + FRICTION_SWITCHES + switching_count(system.friction)
@@ -118,7 +121,8 @@ def earliest_crossing(
                 first = earlier_event(first, walk_state, finder, event)
         if inside and foot == progress.stance:
             first = earlier_event(first, walk_state, finder, SLIDE)
-    if watch_order:  # PASSING is an event only if the order of the feet matters
+    # PASSING is an event only if the order of the feet matters.
+    if watch_order:
         first = earlier_event(first, walk_state, finder, PASSING)
     for knee in range(2):
         if walk_state.knee[knee] == BENT:

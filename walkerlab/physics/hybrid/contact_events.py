@@ -21,9 +21,11 @@ PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
 EXTENSION = SLIDE + 1
 EXTENSION_RATE = SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
-PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
+# It has no event function, because it is due at a fixed time.
+PULSE_END = EVENT_FUNCTIONS
 NO_EVENT = -1
-LEGS_TURN = EVENT_FUNCTIONS  # row of the legs' relative angular velocity, not an event
+# Row of the legs' relative angular velocity. It is no event, so it may have the number of PULSE_END, which has no row.
+LEGS_TURN = EVENT_FUNCTIONS
 EVENT_ROWS = EVENT_FUNCTIONS + 1
 FARTHEST_SLIDE = 0.25  # largest slide of a stance foot's material from where it touched, as a fraction of the pitch
 

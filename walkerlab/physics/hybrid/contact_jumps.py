@@ -40,6 +40,7 @@ def change_form(
     # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
     y = method.y
     t = float(method.clock[T])
+    # the form with the same root in which all bodies are separate
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
@@ -47,15 +48,19 @@ def change_form(
     columns = to_full(before.form, Phi[: y.size], size)
     waits = np.zeros(Phi.shape[1])
     ends_step = event < PASSING and event % PER_FOOT == HEIGHT
-    if ends_step:  # before the touch the other leg was the stance leg
+    # The touch has already exchanged the legs' roles; before it, the other leg was the stance leg.
+    if ends_step:
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     if EXTENSION_RATE <= event < PULSE_END:
+        # The event has already latched this knee in the walk state, whose memory `before.knee` is. Before it, the stop
+        # acted.
         stopping = before.knee.copy()
         stopping[(event - EXTENSION) % 2] = STOPPING
         before = before._replace(knee=stopping)
         observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
     if waits.size > 0:
         rate = state_rate(before, y, size, t)
+        # A pulse ends a fixed time after the touch, so no column has to wait for its end.
         if event != PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)
@@ -94,4 +99,5 @@ def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(whole, x, s, c)
     projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
+    # `motion_gradient` differentiates the penetration, which is minus the height.
     return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

@@ -9,7 +9,7 @@ from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
 from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, is_switching
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
-from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
+from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, has_not_lifted, is_above
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
 from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
@@ -81,9 +81,11 @@ def walk_in_form(
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
+    # The next step size of the form before serves as the first one of this form.
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     search = seek(deadline(system, walk_state, method.clock[T]), NO_EVENT)
     terrain = walk_state.ground.terrain
+    # The feet's order also decides when a walk with `until` ends, and which foothold's height a foot gets.
     watch_order = terrain.order_matters or until >= 0 or is_uneven(terrain)
     while steps_are_left(walk_state, until):
         status = advance(method, system, search.target)
@@ -115,7 +117,7 @@ def walk_in_form(
 
 @kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
-    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
+    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and has_not_lifted(walk_state))
 
 
 @kernel_part
@@ -134,6 +136,7 @@ def aim(
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
+    # This solver step was shortened to end at an event, but shows none: it may have ended just before it.
     if search.approaching and end >= search.target:
         return confirm(search, start, time_to_zero(method, finder, search.event))
     return EventSearch(
@@ -147,6 +150,7 @@ def approach(
 ) -> EventSearch:
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
     latest = search.latest if search.approaching else end
+    # If another event comes first now, its refinements count from zero.
     refinements = search.refinements if search.approaching and event == search.event else 0
     # A solver step cannot have length zero.
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -200,6 +204,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     target = search.target + wait
     refinements = search.refinements + 1
     rewinds = search.rewinds + 1
+    # The event cannot lie beyond the solver step in which it first appeared.
     if not occurs and doubtful and start < target <= search.latest:
         return EventSearch(
             target,
@@ -249,6 +254,7 @@ def react(
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return endings.CHANGES_FORM
+    # The force is continuous at its switching points, so the method continues with its history.
     if not is_switching(event):
         begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     return endings.GOES_ON
@@ -269,6 +275,7 @@ def jumps_at_touch(system: OnGround) -> bool:
 def deadline(system: OnGround, walk_state: WalkState, t: float) -> float:
     """Compute the time (s) at which the step or a flight gets too long or the push-off ends, whichever is first."""
     by_step, by_flight = time_limits(walk_state)
+    # A rest shorter than the accuracy of event times counts as over.
     left = pulse_left(system, t)
     return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 
@@ -291,6 +298,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
     if change == 0.0:
         return 0.0
     wait = -finder.values[event, last] * span / change
+    # A function that hardly changes would send the target far away.
     return max(-0.5 * h, min(0.5 * h, wait))
 
 

@@ -141,6 +141,7 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     """Record work and losses of the last solver step, and the energy residual at its end."""
     account = observer.account
     add_work_until(method, system, 1.0, account)
+    # TORQUE and FORWARD are parts of HIP_WORK and do not count again.
     lost = -account[PUSH_OFF] - account[HIP_WORK]
     for entry in range(PUSH_OFF):
         lost += account[entry]
@@ -174,6 +175,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
         y = vector(STATE_VECTOR)[: method.y.size]
+        # If rounding hides the crossing, it is at the end of the solver step.
         interpolate(method, system, min(at, 1.0), y)
         deepest = max(deepest, -relative_to_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
     observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
@@ -242,10 +244,12 @@ def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: i
     friction = 0.0
     let_go = True
     last = len(weights) - 1
+    # The first node, the start of the solver step, has weight zero. It only serves the elastic energies below.
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])
         damping += span * weights[i] * power[0]
         friction += span * weights[i] * power[1]
+        # The end of the solver step may lie on either side of a release.
         let_go = let_go and (i == last or power[2] == 0.0)
     if let_go:
         damping = foot_elastic_energy(system, foot, states[0]) - foot_elastic_energy(system, foot, states[last])

@@ -46,7 +46,8 @@ EXPECTED_STEP = 3.0  # pendulum times; most steps are shorter
 # libraries' multistep methods. In the stability catalogue it is at most 9; the worst case is ground of 1e14 N/m.
 RESIDUAL_FACTOR = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
-FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
+# rtol below which rounding, not the tolerance, determines the residual
+FINEST_RTOL = 1e-10
 
 
 @dataclass(frozen=True)
@@ -145,10 +146,12 @@ def new_observer(
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
+    # The work in completed steps needs the springs' energy at the start even if no balance is kept.
     if track_energy or walker.whole.sprung:
         system = place_on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
         tally.start_energy = total_energy(system, y)
         tally.start_spring = hinge_energies(system, y)[0]
+        # The tolerance is relative to this energy, which must not depend on how far down the slope the walk starts.
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,
@@ -188,6 +191,7 @@ def walk_on(
     system = present_walker(walker, walk_state, pinned)
     tangent = observer.tangent.Phi
     half = len(start) // 2
+    # A pinned form has no coordinates of the root.
     root = 2 if pinned else 0
     y = to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
@@ -272,6 +276,7 @@ def run_parts(
         release_pin(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
             return first
+        # The pinned foot was on the ground until now.
         walk_state.progress.airborne_since = first.time_s
     stopped = walk_on(walker, tolerances, walk_state, observer, y)
     if stopped.outcome is Outcome.WALKED:
@@ -294,6 +299,7 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
+    # The released foot is exactly at the surface, which is no touch.
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
 
 

@@ -81,6 +81,8 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
     sides, at_zero = initial_sides(walker, feet, stance, y)
     for foot in range(2):
         on_pad = has_ground_in_cell(int(cells[foot]))
+        # A swing foot that starts above the ground and ahead of the stance foot may land, even if the order of the feet
+        # matters.
         coming_down = sides[foot * PER_FOOT + HEIGHT] > 0 and (sides[PASSING] > 0) == (foot == 1)
         has_ground[foot] = on_pad and (starts_with_ground(terrain, foot == stance) or coming_down)
     return WalkState(
@@ -124,6 +126,7 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
             knee[swing] = BENT
         straight = max(abs(extension(whole, swing, y)), abs(extension_rate(whole, swing, y))) < STRAIGHT_KNEE
         heights = [foot.height for foot in feet_motion(whole, y)]
+        # The longest lever stands for the leg length, which a ContactWalker does not contain.
         if straight and abs(heights[0] - heights[1]) > ON_GROUND * abs(whole.foot_y[0]).max():
             knee[swing] = LOCKED
     return knee
@@ -148,6 +151,7 @@ def initial_sides(
         sides[[first + LEFT_EDGE, first + RIGHT_EDGE]], sides[first + VERTICAL_VELOCITY] = 1, -1
         signs = (feet[foot].height, feet[foot].vertical_velocity)
         sides[first + HEIGHT], at_zero[first + HEIGHT] = zero_side(signs, (size, speed), -1)
+    # velocities of the contact points: slip without the part that the turning ball adds
     rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]
     order = (feet[1].along - feet[0].along, rates[1] - rates[0])
     sides[PASSING], at_zero[PASSING] = zero_side(order, (size, speed), 1 if stance == 1 else -1)
@@ -161,6 +165,7 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
     """
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
+            # The second value is reached only if the first one is zero.
             return (1 if value > 0.0 else -1), value is not value_and_rate[0]
     return otherwise, True
 
@@ -187,11 +192,11 @@ def is_ahead(walk_state: WalkState, foot: int) -> bool:
 
 
 @kernel_part
-def is_to_lift(walk_state: WalkState) -> bool:
+def has_not_lifted(walk_state: WalkState) -> bool:
     """Whether the foot that carried the last step has not lifted yet."""
     return walk_state.leaving[1 - walk_state.progress.stance] != 0
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
     """Count the steps with complete slip and rolling: all, or all but the last if its stance foot has not lifted."""
-    return int(walk_state.progress.steps) - int(is_to_lift(walk_state))
+    return int(walk_state.progress.steps) - int(has_not_lifted(walk_state))

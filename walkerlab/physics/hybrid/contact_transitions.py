@@ -49,7 +49,8 @@ from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, 
 from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 
 STEP_AHEAD = 0.25  # fraction of the pitch; a touch less than this ahead of the other foot ends no step
-AT_SURFACE = 1e-11  # m; a foot this close to the surface is on it, within the error of an event's time
+# m; a foot this close to the surface is on it, within the error of an event's time
+AT_SURFACE = 1e-11
 TRIP = 0.25  # fraction of the pitch; a foot that touches its old pad this far from where it stood has tripped
 
 
@@ -90,6 +91,7 @@ def apply_event(
         else:
             return touch(system.form, walk_state, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
+        # From here on the row belongs to the same edge of the new cell, one pitch away.
         walk_state.at_zero[event] = 0
         # One edge of the old cell is the opposite edge of the new one, so that event function is now zero.
         walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
@@ -103,8 +105,10 @@ def apply_event(
         if is_above(walk_state, foot):
             walk_state.has_ground[foot] = 1
         else:
+            # The foot is below the top of the pad: it has hit the pad's side.
             return OFF_PAD
     elif kind == VERTICAL_VELOCITY:
+        # This function is not watched again before the next touch, when it has another value.
         walk_state.at_zero[event] = 0
         if pulse_left(system, t) > 0.0:
             walk_state.progress.release = AT_PULSE_END
@@ -148,6 +152,8 @@ def set_foothold(
     """Set the ground under a swing foot to its next foothold's height. On an ordinary plane, a foot below it stubs."""
     terrain = walk_state.ground.terrain
     set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
+    # Below its next foothold a foot finds no ground: it passes through a plane where the order of the feet matters, and
+    # stubs on any other.
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
 
@@ -171,6 +177,7 @@ def lift(
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
         walk_state.lifted[foot] = t
+        # The step that this foot carried is over; its slip ends only now.
         if not stands:
             step = walk_state.progress.steps - 1
             walk_state.lift_time[step] = t
@@ -202,6 +209,7 @@ def touch(
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
     pitch = terrain.pitch
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
+        # A rolling foot leaves its pad at a distance from where it touched.
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
         return OFF_PAD if away > TRIP * pitch else GOES_ON
     if feet[foot].along - feet[stance].along < STEP_AHEAD * pitch:
@@ -212,6 +220,7 @@ def touch(
     walk_state.touch_time[step] = t
     walk_state.touch_along[step] = feet[foot].along
     walk_state.touch_height[step] = walk_state.level[foot]
+    # The old stance foot is still down. Its slip up to now is preliminary, until `lift` completes it.
     if not is_above(walk_state, stance):
         note_slip(form, walk_state, feet, stance, y)
         walk_state.leaving[stance] = 1

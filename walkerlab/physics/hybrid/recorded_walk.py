@@ -44,8 +44,10 @@ from walkerlab.physics.solvers.stepping import BUDGET, RHS, clear_counts
 from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
-BUDGET_OF_A_STEP = 50_000  # evaluations of the right-hand side; the tightest tolerance needs about 700
-MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
+# evaluations of the right-hand side; the tightest tolerance needs about 700
+BUDGET_OF_A_STEP = 50_000
+# friction coefficient, about as for rubber on dry concrete
+MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
@@ -139,7 +141,9 @@ def take_walk(
         judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
         recorder.nearest = SHORTEST_LANDING * judged_by
     height = swing_foot(walker, start)[0]
-    if abs(height) > ON_GROUND * walker.leg_length:  # a start in mid-step, where no foot leaves the ground
+    # A start in mid-step, where no foot leaves the ground. With its own height as the foothold that it leaves, the
+    # swing foot's event function is not taken for zero at the start.
+    if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
     if hip_above_fall(walker, start) < 0.0:
@@ -197,7 +201,9 @@ class Recorder:
         seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
         if self.sampled:
+            # Enough samples even if every step takes the longest time that a swing may take.
             room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            # Each block of steps starts at a time of zero.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
             seen.knee_time[0] = -1.0
@@ -218,6 +224,7 @@ class Recorder:
         before = seen.before[:taken]
         after = seen.after[:taken]
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
+        # There are no knee strikes in steps in which a leg without a knee swings.
         for k, shank in enumerate(self.models["shank"]):
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
         if self.sampled:
@@ -238,6 +245,7 @@ class Recorder:
         zeros = compute_in_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
+        # The last duration is that of a swing without a heel strike.
         durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
@@ -289,7 +297,8 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def build_result(self, outcome: Outcome) -> RigidWalkResult:
-        if self.tally.duration == 0.0:  # no swing has begun, so the start has not been observed yet
+        # No swing has begun, so the start has not been observed yet.
+        if self.tally.duration == 0.0:
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
@@ -312,6 +321,7 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
+            # `strike_loss` is the loss minus the work of the push-offs.
             lost_in_strikes=float(self.tally.strike_loss) + driven.push_off,
             start=self.start,
             before=before,

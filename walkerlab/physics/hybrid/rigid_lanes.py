@@ -43,7 +43,8 @@ SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of `LaneMemory.slots`
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
+# pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
+ARRIVAL_TIME = 1e-5
 STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # attempted solver steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times
@@ -59,7 +60,8 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
+    # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
+    unpaired: float
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
@@ -86,6 +88,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
         **values,
         hip=hinge_law(model, HIP_ROW),
         upright=math.atan2(x, y),
+        # With large feet `lowest` may be below -1: the hip cannot get that low.
         fallen=math.acos(max(-1.0, lowest)),
         pendulum_time=math.sqrt(model.leg_length / model.gravity),
     )
@@ -123,6 +126,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).resistance
     r_1 = r_1 - hip
     r_2 = r_2 + hip
+    # M_11 is constant, so the elimination begins with it.
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
     alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)
@@ -141,6 +145,7 @@ class LaneMemory(NamedTuple):
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
     teach_arithmetic()
+    # A finder of degree 5 fits the quintics of hermite.py.
     return LaneMemory(
         rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )
@@ -195,6 +200,8 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
             return waiting
         fates.outcome[waiting - 1], fates.steps[waiting - 1] = endings.REJECTED, 0
     memory.slots[SLOT_OF_START, lane] = NOBODY
+    # An idle lane is computed with the others, so it needs a valid state. Its solver steps have length zero and are
+    # ignored.
     begin_swing(walker, memory, lane, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0)
     return waiting
 
@@ -230,15 +237,18 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     h = min(load_lanes(rows, NEXT_STEP), left)
     stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
-    # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below.
+    # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below. h is negative where a lane goes
+    # back to a heel strike.
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))
     accepted = 1.0 - error
+    # positive if this solver step uses up the time
     over = TINY_ERROR - (left - h)
     pendulum_time = walker.pendulum_time
     stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVALS))
+    # A rejected solver step needs no attention: the lane tries a shorter one next.
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
     quiet = choose(event, 0.0, accepted)
     for i in range(4):
@@ -286,6 +296,7 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
         return endings.FELL
     if strike_at <= 1.0:
         rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
+        # A heel strike right at the start must not look like a solver step that is too small.
         rows[NEXT_STEP, lane] = max(strike_at * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP * walker.pendulum_time)
         return endings.GOES_ON
     if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
@@ -317,6 +328,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
     if abs(wait) > ARRIVAL_TIME * pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
         rows[ARRIVALS, lane] += 1.0
         step_before = abs(rows[STEP_BEFORE, lane])
+        # The solver step may have gone past the heel strike: the next one then goes back.
         rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
         return endings.GOES_ON
     y = vector(walker.model.zero_state)
@@ -345,6 +357,7 @@ def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
 @kernel_part
 def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) -> Jet:
     """Compute swing * theta_1 + stance * theta_2 and its first two time derivatives at an end of a solver step."""
+    # The derivative follows four rows below the state, so the accelerations are six rows below the angles.
     return (
         swing * rows[row, lane] + stance * rows[row + 1, lane],
         swing * rows[row + 2, lane] + stance * rows[row + 3, lane],
@@ -370,6 +383,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     if strike_at > 1.0:
         return NO_CROSSING
     ahead = interpolate_step(memory, lane, 1.0, -1.0, 0.0)
+    # A fall through zero with the swing leg behind is a scuff, which the model ignores.
     while strike_at <= 1.0 and evaluate_quintic(ahead, strike_at) <= 0.0:
         strike_at = first_fall(memory.finder, guard, at_start, strike_at + 1e-12)
     return strike_at

@@ -79,7 +79,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n) in rad, swing leg first, in steps (samples,).
+    """Compute positions of the walker's points for each sample from angles (samples, n) in rad and steps (samples,).
 
     knees_m  position of each leg's knee in its thigh's frame; empty for legs without knees
     """
@@ -91,6 +91,7 @@ def places(
         centre = contact + np.array([0.0, model.radius])
         hip = centre + rotate_levers(psi[:, [STANCE]], [model.hip_x], [model.hip_y])
         foot = centre + rotate_levers(psi, model.foot_x, model.foot_y) - [0.0, model.swing_radius]
+        # `compute_in_turns` passes either even or odd steps. In odd steps leg 2 swings.
         by_role = knees_m[::-1] if step.size and step[0] % 2 else knees_m
         knees = [
             hip + rotate_levers(psi[:, [leg]], [x], [y]) for leg, (x, y) in zip((SWING, STANCE), by_role, strict=False)

@@ -63,7 +63,8 @@ class Observer(NamedTuple):
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n) and any tangent columns: derivatives at a fixed time since the last heel strike
     steps: Any  # (samples,) index of the step in which each sample lies
-    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
+    # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
+    tally: Any
 
 
 def new_observer(times: Any, state_size: int) -> Observer:
@@ -107,6 +108,7 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
                 push = push_off(model, after)
                 along = along - push.along
                 impulse = impulse - push.upward
+                # The push-off acts on the trailing foot, which also needs friction for it.
                 tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
             tally.strike_loss += tally.step_strike_loss
             tally.forward_work += tally.step_forward_work
@@ -122,6 +124,7 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     """Return the ground's pull (N), the friction ratio and the swing foot's depth (m). See section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
+    # The sign of the normal force is changed so that the worst of all three is a maximum.
     return -normal, ratio, -swing_foot(mode.model, y)[0]
 
 
@@ -178,6 +181,7 @@ def refine_maximum(
         middle += shift * spacing
         keep_worst(tally, assumptions_at(method, mode, middle))
         spacing *= 0.125
+        # The next three points must also lie in the solver step.
         middle = min(max(middle, spacing), last - spacing)
 
 
@@ -196,6 +200,7 @@ def observe(
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end = t + fraction * h
     spacing = 0.125 * fraction
+    # `tally.energy` is still that at the end of the solver step before, which is the start of this one.
     mean_energy = SIMPSON[0] * tally.energy
     y = vector(mode.model.zero_state)
     before = middle = assumptions_at(method, mode, 0.0)
@@ -204,6 +209,7 @@ def observe(
         after = record_extremes(tally, mode, y)
         mean_energy += SIMPSON[eighth] * tally.energy
         for measure in range(3):
+            # The parabola through the last three samples has its maximum between them.
             if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
                 refine_maximum(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before = middle

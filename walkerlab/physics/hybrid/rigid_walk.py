@@ -206,6 +206,8 @@ def swing_phase(
     # A phase starts on the strike that ended the previous one; that zero is ignored.
     limit = latest
     coming = False
+    # After a knee strike the swing foot is in the air and the knee is no longer watched, so no event function starts at
+    # zero.
     at_start = is_bent(system) or system.model.shank == NO_SHANK
     begin(method, system, t, y, method.clock[H_NEXT])
     observe_start(observer, system, y)
@@ -213,6 +215,7 @@ def swing_phase(
         status = advance(method, system, limit)
         if status != STEP_DONE:
             return endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED
+        # The interval up to a located event was searched and observed before the solver step was rewound.
         if coming:
             continue
         near = may_end(system, method, at_start)
@@ -228,6 +231,7 @@ def swing_phase(
             observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
         if fall < min(strike, knee_strike):
             return endings.FELL
+        # The foot lands before the knee has locked.
         if is_bent(system) and strike < knee_strike:
             return endings.BENT_KNEE
         if min(strike, knee_strike) <= 1.0:
@@ -268,6 +272,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
+    # The solver step ends at the event up to the error of its dense output, so a step of first order bridges the rest.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]
@@ -283,6 +288,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
             lift = strikes.lift[step + 1, column - 1]
             if lift != 0.0 and not knee:
                 _, _, upward, _ = swing_foot_motion(model, y, y[n : 2 * n])
+                # A foothold that rises meets the foot earlier: `upward` is negative.
                 wait += lift / upward
             waits[step, column - 1] = wait
             shift_column(y, at, f, wait)
@@ -313,9 +319,7 @@ class HeelStrikes(NamedTuple):
 def new_heel_strikes(
     steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0, columns: int = 0
 ) -> HeelStrikes:
-    """Create room for heel strikes with states of m values, tangent columns included. The fields are as in
-    `HeelStrikes`.
-    """
+    """Allocate the arrays of `HeelStrikes` for states of m values, tangent columns included."""
     before, after = np.zeros((2, steps, m))
     even = np.zeros(steps + 1) if rise is None else rise
     knee_time = np.zeros(steps if kneed else 0)

@@ -65,6 +65,7 @@ def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
     d = np.zeros((len(assembly.bodies), 2))
     here = np.array(root.at_m)
     for body, leaving, entering in path(assembly, root.body, point.body):
+        # A body's lever runs from the point where the path enters the body to the point where it leaves it.
         d[assembly.index(body)] += np.array(leaving) - here
         here = np.array(entering)
     d[assembly.index(point.body)] += np.array(point.at_m) - here
@@ -114,7 +115,8 @@ def tree_about(assembly: Assembly, root: Anchor) -> Tree:
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
-    """Compute the constants about the centre of mass, and the levers (bodies, 2) in m from it to each foot's centre."""
+    """Compute the constants about the centre of mass, and the levers (bodies, 2) in m from there to each foot."""
+    # Any point serves as the first root; the levers are then shifted to the centre of mass.
     root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)

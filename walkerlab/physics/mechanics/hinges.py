@@ -90,6 +90,7 @@ def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
 @kernel_part
 def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of a hinge's torques on its two bodies to by_angle and by_rate (n, n)."""
+    # The two torques are opposite, and depend on the difference of two angles.
     for row, sign in ((other, 1.0), (body, -1.0)):
         by_angle[row, body] += sign * now.by_angle
         by_angle[row, other] -= sign * now.by_angle

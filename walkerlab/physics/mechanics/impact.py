@@ -59,7 +59,8 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     factors = matrix(like)
     sines_cosines(before, n, y, s, c)
     projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
-    # velocity of the new stance foot's centre, along the slope and normal to it
+    # Velocity of the new stance foot's centre, along the slope and normal to it. The old foot's centre moves at -R
+    # omega; at a heel strike the levers to the other foot are added.
     along = -R_before * y[n + STANCE]
     upward = 0.0
     if other_foot:
@@ -69,6 +70,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     for k in range(n):
         body = model.roles[k] if other_foot else k
         new[k], new[n + k] = y[body], y[n + body]
+    # p is scratch here: finite torques have no part in an impact.
     equations(model, new, s, c, F, U, M, p)
     for k in range(n):
         for l in range(n):
@@ -88,6 +90,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         along = -R_before * y[at + n + STANCE]
         upward = 0.0
         if other_foot:
+            # The root's velocity above, differentiated with dF/dtheta = -U and dU/dtheta = F.
             for l in range(n):
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
                 upward += foot_F[l] * y[at + n + l] - foot_U[l] * y[at + l] * y[n + l]
@@ -100,6 +103,8 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         turn = new[at : at + n]
         rate = new[at + n : at + 2 * n]
+        # Z^T M (u+ - u) = 0 also holds for neighbouring angles. Its change contains Z^T dM (u+ - u), while Z is
+        # constant.
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
         project(model, constraints, rate, along, upward, twist, turned, p)
         for k in range(n):
@@ -141,6 +146,7 @@ def lock(
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
         project(tree, constraints, rates, along=0.0, upward=0.0, twist=0.0, turned=turned, p=changes)
+    # p is a projection in the metric M, so p^T M (omega - p) = 0 and the loss has this form.
     return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 
@@ -170,7 +176,10 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     y_l = s_l * model.hip_x + c_l * model.hip_y + R_l
     length = math.hypot(x_t, y_t)
     share = model.push_off / length
+    # The impulse passes through the hip; this is its moment about the leading leg's contact point.
     angular = share * (x_l * y_t - y_l * x_t)
+    # Turning a leg moves the hip about the arc's centre, which is R above the contact point: dx = -(y - R), dy = x.
+    # With R > 0 the length of the trailing line also changes.
     by_trailing = share * (x_l * x_t + y_l * (y_t - R_t)) - angular * x_t * R_t / (length * length)
     by_leading = -share * ((y_l - R_l) * y_t + x_l * x_t)
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
@@ -219,7 +228,9 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
     equations(model, new, s, c, F, U, M, p)
+    # `equations` has filled p with torques, which do nothing in an instant.
     p[:] = 0.0
+    # A forward impulse above the foothold turns the stance leg clockwise.
     p[STANCE] = -impulse * hip_height(model, new)
     factor_linked(E, n, M)
     solve_linked(E, n, M, p)

@@ -37,6 +37,7 @@ def factor_linked(E: Any, n: int, M: Any) -> None:
             for l in range(n):
                 M[c, l], M[l, c] = 0.0, 0.0
             M[c, c] = 1.0
+    # M is positive definite, so no row exchanges are needed.
     for k in range(n):
         M[k, k] = 1.0 / M[k, k]
         for i in range(k + 1, n):

@@ -72,13 +72,17 @@ def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bo
     soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
     n = len(groups.names)
     members = groups.members
+    # Each body belongs to one group, whose index is that of the only 1 in its row.
     coupled = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
     knees = {shank: np.eye(n)[thigh] for shank, thigh in groups.knees}
     # If only the other leg has a knee, this leg still has an index for a shank, which stays in line with the leg.
     coupled |= {body: np.eye(n)[SWING] for body in range(n) if not members[:, body].any()}
+    # If the trailing knee is free in the strike, its rate afterwards does not follow from the others and is a
+    # coordinate.
     free = () if knee_locked_at_strike else tuple(knees)
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**coupled, **knees}
+    # in the order BENT, STRAIGHT, AT_STRIKE
     reductions = [reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
     shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
     return new_rigid_model(

@@ -311,6 +311,7 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
     for k in range(n):
         for l in range(n):
             by_angle[k, l], by_rate[k, l] = 0.0, 0.0
+        # From M'_ks = M_ks + R U_k, with dU/dtheta = F.
         by_angle[k, k] = -R * F[k] * alpha[STANCE]
     add_gravity_gradient(model, n, F, U, by_angle)
     add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
@@ -363,6 +364,7 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     sines_cosines(model, n, y, s, c)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)
     derivative(system, 0.0, y, f)
+    # Newton's law for the centre of mass, which moves with the rolling foot's centre and with the first moments.
     along = -model.mass * (model.radius * f[n + STANCE] + model.gravity_along)
     normal = model.mass * model.gravity_down
     for k in range(n):
@@ -390,6 +392,7 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
     s, c, F, U = vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x)
     r, M = vector(model.arm_x), matrix(model.arm_x)
     equations(model, y, s, c, F, U, M, r)
+    # The foot's centre has rolled this far since the leg was normal to the slope.
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
     for row in range(len(model.hinges)):
@@ -406,6 +409,7 @@ def energy_at_touch(model: RigidModel, touched: Any) -> Any:
 @kernel_part
 def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
     """Compute the swing foot's height above the stance foot and its distance ahead of it (m)."""
+    # The changes are not used, so any array serves as `turn`.
     height, ahead, _, _ = swing_foot_motion(model, y, y)
     return height, ahead
 

@@ -150,6 +150,8 @@ def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -
     """Write the mass matrix (kg m^2) into M (n, n), and add the centrifugal torques (N m) to r (n,)."""
     for k in range(n):
         M[k, k] = tree.A[k, k]
+        # B is antisymmetric and Delta changes sign with the order of the pair, so M is symmetric, `turning`
+        # antisymmetric, and zero on the diagonal.
         for l in range(k):
             A, B = tree.A[k, l], tree.B[k, l]
             cos_d = c[l] * c[k] + s[l] * s[k]
@@ -181,6 +183,7 @@ def add_inertia_gradients(
             sin_d = s[l] * c[k] - c[l] * s[k]
             turning = A * sin_d - B * cos_d
             change = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
+            # All terms depend on theta_l - theta_k, so the derivative by theta_k is the opposite.
             diagonal -= change
             by_angle[k, l] += change
             by_rate[k, l] += 2.0 * omega[l] * turning

@@ -32,6 +32,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     c3 = fused(z, -2.75573143513906633035e-07, 2.48015872894767294178e-05)
     c5 = fused(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09)
     half = 0.5 * z
+    # (1 - leading) - half is the rounding error of `leading`, which is added back, as in k_cos.c.
     leading = 1.0 - half
     return sine, leading + fused(w, fused(w, fused(w, c5, c3), c1), (1.0 - leading) - half)
 

@@ -57,6 +57,7 @@ def replace_second_leg(walker: Assembly, other: Assembly) -> Assembly:
     sources = (walker, legs[0]), (other, legs[1])
     names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])
     bodies = {body.name: body for source, leg in sources for body in source.bodies if body.name in leg}
+    # The hip joins bodies of both legs, so the hinges within one leg are knees.
     knees = tuple(j for source, leg in sources for j in source.joints if {j.parent, j.child} <= {*leg})
     return Assembly(
         bodies=tuple(bodies[name] for name in names),

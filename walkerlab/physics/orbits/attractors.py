@@ -139,6 +139,7 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
         if walk.outcome is not Outcome.WALKED:
             return None
+        # At a gait with a multiplier of zero a step may shrink the tangent to nothing.
         growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
         repeats = find_period(walk.points[transient:]) > 0
         blocks = MIN_BLOCKS if repeats else min(MAX_BLOCKS, independent_blocks(growth))
@@ -190,6 +191,7 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
         for _ in range(MAX_CLOSE_RETURNS):
             nearest = int(np.argmin(misses))
             seeds.append(Seed(points[nearest], attractor.value, period))
+            # Its neighbours on the orbit return nearly as closely, and would lead to the same gait.
             misses[max(0, nearest - 2 * period) : nearest + 2 * period] = np.inf
     return seeds
 

@@ -21,7 +21,8 @@ from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, s
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, Integers
 
-RTOL, ATOL = 1e-6, 1e-8  # tolerances of walks in a basin; they cause errors of 1e-7 per step
+# tolerances of walks in a basin; they cause errors of 1e-7 per step
+RTOL, ATOL = 1e-6, 1e-8
 CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # tolerances of walks that determine attractors
 SECTION_SIZE = 3
 UNREACHED = -1  # attractor index of a walk that reaches no attractor
@@ -60,6 +61,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
         observer.last[walk, i] = y[i + 1]
     for k in range(observer.owner.size):
         a, b, c = y[1] - observer.points[k, 0], y[2] - observer.points[k, 1], y[3] - observer.points[k, 2]
+        # Strict, so that an attractor with a reach of zero captures nothing.
         if a * a + b * b + c * c < observer.reach[k]:
             observer.attractor[walk] = observer.owner[k]
             return WALKED
@@ -140,6 +142,7 @@ def walk_one_by_one(
             points = part.z
             steps_taken = part.time.size
             near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
+            # The points of attractors lie a stride apart, so only whole strides are compared with them.
             near[np.arange(1, len(near) + 1) % stride != 0] = False
             if near.any():
                 steps_taken = int(np.argmax(near.any(axis=1))) + 1
@@ -183,6 +186,7 @@ def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple
     points = rough.last[elsewhere]
     # Most walks end on the same few cycles, so walks that end at the same point are continued only once.
     _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
+    # `np.unique` sorts by value; the sorted indices restore the order of the starts.
     distinct = points[np.sort(first)][:MAX_SETTLED_WALKS]
     settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=tight)
     cycles: list[Floats] = []

@@ -21,7 +21,8 @@ from walkerlab.physics.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
 BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
-NORMAL_FORM_STEP = 1e-3  # difference step for the normal form; coordinates are of magnitude one
+# difference step for the normal form; coordinates are of magnitude one
+NORMAL_FORM_STEP = 1e-3
 FORM_REFINEMENTS = 4
 FIRST_MULTIPLIER_DROP = 0.2  # 1 minus the multiplier at the first point of a new branch
 PAIR_TOLERANCE = 1e-4  # distance from the unit circle within which multipliers form a critical pair
@@ -70,6 +71,7 @@ class Bifurcation:
         return self.point.evaluated.data
 
     def lies_between(self, first: Cycle, second: Cycle) -> bool:
+        # The points of a branch are copies that share their array z, so the arrays identify them.
         ends = (self.segment.first, self.segment.second)
         return {id(end.evaluated.data.z) for end in ends} == {id(first.z), id(second.z)}
 
@@ -84,7 +86,8 @@ def locate_bifurcation(segment: Segment[Cycle], kind: Kind, scale: float) -> Bif
     multipliers = point.evaluated.data.multipliers
     if kind == "torus":
         on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < PAIR_TOLERANCE]
-        if not on_circle:  # two real multipliers with product one: a saddle, not a bifurcation
+        # Two real multipliers with product one also satisfy the test. They belong to a saddle, not to a bifurcation.
+        if not on_circle:
             return None
         multiplier = complex(on_circle[0])
     else:
@@ -111,6 +114,7 @@ class FlipForm:
 
 def eigenvector(A: Floats, value: float) -> Floats:
     _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
+    # The right singular vector of the smallest singular value spans the kernel.
     return np.asarray(rows[-1])
 
 
@@ -135,6 +139,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
         if terms is None:
             return form
         form = FlipForm(v, w, *terms, rate)
+        # The difference step must be small compared with the amplitude at which the form is used.
         if probe <= 0.5 * form.amplitude:
             break
         probe = 0.2 * form.amplitude
@@ -162,6 +167,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
     if across is None:
         return None
     B_inner = size * (across[0] - across[1]) / (2.0 * h)
+    # Kuznetsov's coefficient, <w, C(v, v, v) + 3 B(v, (1 - A)^-1 B(v, v))> / 6.
     cubic = float(w @ (C_vvv + 3.0 * B_inner)) / 6.0
     return (0.5 * inner, cubic) if cubic != 0.0 else None
 
@@ -172,6 +178,7 @@ def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tu
     Return it, the normal of the correction plane, and the amplitude.
     """
     xi = share * form.amplitude
+    # The gait of twice the period has -(1 + rate s) xi + cubic xi^3 = -xi.
     s = form.cubic * xi * xi / form.rate
     guess = flip.point.x + s * flip.point.tangent
     guess[:-1] += xi * form.direction + xi * xi * form.bend

@@ -115,7 +115,8 @@ def solve_gait_on(pads: AdaptivePads, z: Floats, steps: int, rigidity: float = 0
 
 def scale_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
-    # The full-damping penetration shrinks like the static penetration, so that the damping ratio is unchanged.
+    # The full-damping penetration shrinks like the static penetration, so that a resting foot has the same share of the
+    # full damping.
     normal = walker.normal.stiffen(stiffness, damping, stiffness ** (-1.0 / walker.normal.exponent))
     return walker._replace(normal=normal, friction=walker.friction.scale_creep(creep))
 
@@ -170,4 +171,5 @@ def follow_from_rigid(
 
 
 def append_length(gait: Cycle) -> Floats:
+    # The pitch of the pads is followed together with the gait.
     return np.append(gait.z, gait.lengths_m)

@@ -79,6 +79,7 @@ def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
     # if only one leg has a knee, there are fewer where that leg stands
     locked = locked_shank(walker, stance)
+    # `legs` repeats the last body of a leg without a knee, and `dict.fromkeys` drops the repetition.
     bodies = (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
     return tuple(dict.fromkeys(bodies))
 
@@ -198,7 +199,8 @@ def step_from_section(
     """
     laid = ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
+    # The stance foot stands in the middle of a pad.
+    if ground.terrain.has_pads:
         foothold = feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
         laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
@@ -214,7 +216,8 @@ def step_from_section(
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
-    if derived:  # project the flow's derivative onto the section, along the flow
+    # Project the flow's derivative onto the section, along the flow.
+    if derived:
         system = present_walker(walker, walk_state)
         rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
         gradient = np.zeros(end.size)
@@ -256,6 +259,7 @@ def walk_from_section(
     stance: int = STANCE_FOOT,
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
+    first_stance = stance
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
     walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
@@ -265,6 +269,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
+        # With room for a single touchdown, the walk stops there for the push.
         stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(
             place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
@@ -275,40 +280,61 @@ def walk_from_section(
     if stopped.outcome is Outcome.WALKED:
         stance = int(walk_state.progress.stance)
         z = coordinates_of(walker, np.array(stopped.state), stance)
+        # Heights on the section are measured from the ground of the stance foot.
         z[0] -= walk_state.level[stance]
         stopped = go_on(walk_state, stopped.state)
     touched = int(walk_state.progress.steps)
     times = walk_state.touch_time[:touched]
     along = walk_state.touch_along[:touched]
-    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), np.diff(walk_state.touch_height[:touched]))
+    angles = touch_angles(walker, first_stance, np.diff(along), np.diff(walk_state.touch_height[:touched]))
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
 
 
-def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above."""
-    apart = 0.5 * np.hypot(along, up) / leg_length
-    return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
+def leg_lengths(walker: ContactWalker) -> Floats:
+    """Return the lengths (2,) of the straight legs from hip to sole (m)."""
+    levers = walker.whole.foot_y
+    below_hip = [(levers[1 - k] - levers[k])[np.unique(walker.legs[k])].sum() for k in range(2)]
+    return np.asarray(walker.whole.radius + below_hip)
+
+
+def touch_angles(walker: ContactWalker, foot: int, along: Floats, up: Floats) -> Floats:
+    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above.
+
+    foot  the first to land, after which the feet take turns
+    """
+    apart = np.hypot(along, up)
+    lengths = leg_lengths(walker)[np.add.outer((foot, 1 - foot), np.arange(apart.size)) % 2]
+    ahead = 0.5 * (apart + (lengths[0] ** 2 - lengths[1] ** 2) / apart) / lengths[0]
+    return np.asarray(np.arcsin(np.clip(ahead, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
 
 def sample_legs_from_section(
-    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    heights: Floats,
+    times: Floats,
+    stance: int = STANCE_FOOT,
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
-    start = state_on_section(walker, z, STANCE_FOOT)
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size)
+    start = state_on_section(walker, z, stance)
+    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size, stance)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
-    legs = [ANGLES + walker.legs[foot][0] for foot in (STANCE_FOOT, 1 - STANCE_FOOT)]
+    legs = [ANGLES + walker.legs[foot][0] for foot in (stance, 1 - stance)]
     return np.asarray(observer.samples.states[:, legs])
 
 
 def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+    # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
     over = np.append(heights[0], heights) - heights[0]
     return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
     fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling", "lift_time")
+    # The shorter arrays are views, so steps are recorded in `walk_state` itself.
     return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 
@@ -323,6 +349,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     M = np.zeros((n, n))
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
+    # A forward impulse above the centre of mass turns the walker clockwise.
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
     factor_linked(form.E[0], n, M)
     solve_linked(form.E[0], n, M, r)
@@ -344,6 +371,7 @@ def walk_state_on_section(
     walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
         ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
+    # The swing foot is above the gap that follows the pad it left.
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
     walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
     return walk_state
@@ -379,7 +407,8 @@ class ContactMap(StepMap):
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     disturbs_after = 1
-    probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
+    # small compared with the penetration of stiff ground, which is below 0.01 mm
+    probe = 1e-6
 
     def __init__(
         self,
@@ -388,8 +417,12 @@ class ContactMap(StepMap):
         tolerances: Tolerances,
         step_length_m: float,
         like: WalkerOnGround,
+        first: int = 0,
     ) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units.
+
+        first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
+        """
 
         @lru_cache(CACHE_SIZE)
         def site_at(p: float) -> WalkerOnGround | None:
@@ -402,18 +435,22 @@ class ContactMap(StepMap):
         self.scale = scale
         self.tolerances = tolerances
         self._on_pads = like.ground.terrain.has_pads
-        angled = angled_bodies(like.walker, STANCE_FOOT)
-        turning = turning_bodies(like.walker, STANCE_FOOT)
+        self._first = first
+        angled = angled_bodies(like.walker, self._stance(0))
+        turning = turning_bodies(like.walker, self._stance(0))
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
-        self._units = [section_units(like, stance_of(swing)) for swing in range(2)]
+        self._units = [section_units(like, self._stance(swing)) for swing in range(2)]
+
+    def _stance(self, swing: int) -> int:
+        return stance_of(self._first + swing)
 
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units[0])
 
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
         pitch_m = site.ground.terrain.pitch
-        stance = stance_of(swing)
+        stance = self._stance(swing)
         z_m = z * self._units[swing % 2]
         return step_from_section(site.walker, site.ground, self.tolerances, z_m, pitch_m, derived, stance)
 
@@ -449,19 +486,22 @@ class ContactMap(StepMap):
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         scene = (site.walker, site.ground, endless)
-        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, stance_of(swing))
+        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, self._stance(swing))
+        # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
+        # units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:
         site = self._at(p)
-        return z if site is None else stand(site.walker, z * self._units[0], STANCE_FOOT) / self._units[0]
+        return z if site is None else stand(site.walker, z * self._units[0], self._stance(0)) / self._units[0]
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site = valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
-        return sample_legs_from_section(site.walker, site.ground, endless, z * self._units[0], heights_m, times)
+        start = z * self._units[0]
+        return sample_legs_from_section(site.walker, site.ground, endless, start, heights_m, times, self._stance(0))
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         stride = walk_steps(self, z, p, self.stride, derived=False)

@@ -133,7 +133,8 @@ def correct(
 @dataclass(frozen=True)
 class StepControl:
     first: float = 0.01  # arclength of the first step
-    shortest: float = 1e-9  # arclength; folds of long gaits are sharper than 1e-8
+    # arclength; folds of long gaits are sharper than 1e-8
+    shortest: float = 1e-9
     longest: float = 0.05  # arclength
     turn: float = 0.97  # cosine of the largest angle between the tangents of neighbouring points
     tolerance: float = 1e-12  # largest residual of the equations
@@ -160,6 +161,7 @@ def step_along(
         point = correct(equations, guess, last.tangent, control.tolerance)
         if isinstance(point, CurvePoint):
             correction = float(np.linalg.norm(point.x - guess))
+            # A sharp turn or a long correction may lead to another branch.
             if point.tangent @ last.tangent > control.turn and correction < 0.5 * length and acceptable(point):
                 longer = 1.6 if point.corrections <= FEW_CORRECTIONS else 1.0
                 return point, min(control.longest, longer * length)
@@ -210,7 +212,9 @@ def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], flo
 
     try:
         root = brentq(measure_at, 0.0, segment.length, xtol=ROOT_RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        # The root must be among `points`, even if Brent's method did not evaluate the measure there.
         measure_at(root)
+    # Brent's method raises ValueError if the measure has the same sign at both ends.
     except (_OffTheCurve, ValueError):
         return None
     return points[root]

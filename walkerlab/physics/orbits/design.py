@@ -55,7 +55,9 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
     seen = dict[bytes, Point | None]()
 
     def point_at(u: Floats) -> Point | None:
+        # SLSQP may leave the bounds by rounding.
         x = problem.lower + np.clip(u, 0.0, 1.0) * span
+        # The objective and each constraint ask for the same point in turn.
         if x.tobytes() not in seen:
             seen[x.tobytes()] = problem.evaluate(x)
         point = seen[x.tobytes()]
@@ -78,6 +80,8 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
                 return scale * point.numbers[name], scale * point.gradients[name] * span
             last, last_point = last_good[0]
             back = u - last
+            # At the last good point itself, which may lack this quantity, the distance counts as one range, so that the
+            # value rises.
             distance = float(np.linalg.norm(back)) or 1.0
             return scale * last_point.numbers[name] + PENALTY_SLOPE * distance * distance, 2.0 * PENALTY_SLOPE * back
 
@@ -92,7 +96,9 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
         objective, last_good[0][0], jac=True, method="SLSQP", bounds=[(0.0, 1.0)] * span.size, constraints=constraints,
         options={"ftol": PRECISION, "maxiter": MAX_DESIGN_ITERATIONS},
     )  # fmt: skip
+    # The last point evaluated need not be the result.
     point_at(np.clip(result.x, 0.0, 1.0))
+    # On a bound the gradient need not vanish.
     free = (result.x > BOUND_TOLERANCE) & (result.x < 1.0 - BOUND_TOLERANCE)
     search.gradient_norm = float(np.linalg.norm(objective(result.x)[1][free]))
     return search

@@ -103,6 +103,7 @@ class GaitBranch:
             if gait.stable:
                 values.append(gait.value)
             if gait.stable != following.stable:
+                # Where no bifurcation was located, stability changes somewhere between the two points.
                 on_it = (b.value for b in self.bifurcations if b.lies_between(gait, following))
                 edge = next(on_it, 0.5 * (gait.value + following.value))
                 if stable:
@@ -122,6 +123,7 @@ class GaitBranch:
                 yield first, first.z + share * (second.z - first.z)
 
     def closes_on(self, flip: Bifurcation) -> list[bool]:
+        # An end counts as near a flip up to twice the distance to its neighbour on the branch.
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
         return [flip.kind == "flip" and end.closes and is_near for end, is_near in zip(self.ends, near, strict=True)]
@@ -143,7 +145,7 @@ class Seed(NamedTuple):
 
 @dataclass(frozen=True)
 class BranchTracer:
-    """Follows one branch of gaits, from one of them to its end."""
+    """Follows a branch of gaits from one gait to the end of the branch."""
 
     step_map: StepMap
     span: ValueSpan
@@ -169,6 +171,7 @@ class BranchTracer:
         bifurcations = list[Bifurcation]()
         crossings = list[Crossing]()
         step = self.control.first
+        # Just beyond a flip, a long step could lead to the same cycle with its halves exchanged.
         if period > self.step_map.stride:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
         while end is None:
@@ -200,7 +203,8 @@ class BranchTracer:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
             before = last
             last = solved
-        if end.reason == CLOSED_LOOP:  # begin at an unstable gait, so that no stable stretch is split
+        # Begin at an unstable gait, so that no stable stretch is split.
+        if end.reason == CLOSED_LOOP:
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
             points = [*points[begin:-1], *points[: begin + 1]]
             end = replace(end, value=points[0].value)
@@ -328,7 +332,7 @@ class BranchFollower(BranchTracer):
         return False
 
     def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
-        """Whether a gait well inside another branch, a quarter of the way along it, lies on a branch."""
+        """Whether `branch` covers `other`, judged by the gait a quarter of the way along `other`."""
         # half of the way along may be a fold, near which gaits of both arms are hardly distinct
         covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
         return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
@@ -356,6 +360,7 @@ class BranchFollower(BranchTracer):
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
+            # A correction as large as the amplitude may have led back to the gait of the single period.
             if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
                 half = self.equations(period)(point.x)
                 parting = half.value @ (half.jacobian @ point.tangent)

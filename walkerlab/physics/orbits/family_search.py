@@ -130,6 +130,11 @@ class FamilySearch:
         control = self.thoroughness.branch_control
         return BranchFollower(self.step_map, self.span, control, self.points, self.listener.advance)
 
+    @property
+    def steps_are_alike(self) -> bool:
+        """Whether all steps are of equal legs, as the search for attractors needs."""
+        return self.step_map.stride == 1
+
     def announce(self, what: str, total: int | None = None) -> None:
         self.listener.start(f"continuation: {what}".format(model=f"the {self.model} model"), total)
 
@@ -140,9 +145,7 @@ class FamilySearch:
     def family(self, generator: np.random.Generator) -> Family:
         """Run the whole search. `generator` draws the scattered starts."""
         results = self.branches()
-        if self.step_map.stride > 1:  # attractors are looked for by steps that are all alike
-            return results
-        if self.periods > 1:
+        if self.periods > 1 and self.steps_are_alike:
             results = self.add_attractors(results)
         if self.thoroughness.other_gaits and results.attractors.found:
             results = self.add_other_gaits(results, generator)
@@ -170,6 +173,7 @@ class FamilySearch:
         attractors = sweep_attractor(self.step_map, start, values, how.transient, how.samples, self.listener.advance)
         if not attractors.found:
             return replace(family, attractors=attractors)
+        # Attractors are listed by rising value.
         if end < begin:
             attractors = replace(attractors, found=attractors.found[::-1])
         chosen = attractors.found[:: max(1, len(attractors.found) // how.exponents)]
@@ -228,10 +232,10 @@ class FamilySearch:
             follow_curve(bifurcation, branch.period, span, plane, CURVE_POINTS, advance, how.curve_control)
             for branch in family.branches
             for bifurcation in branch.bifurcations
-            if branch.period <= how.curve_periods and bifurcation.kind != "torus"
+            if branch.period <= how.curve_periods * self.step_map.stride and bifurcation.kind != "torus"
         ]
         regions = None
-        if self.thoroughness.other_gaits:
+        if self.thoroughness.other_gaits and self.steps_are_alike:
             self.announce("regions of the plane of two parameters")
             regions = find_regions(family.branches, span, plane, advance)
         return replace(family, curves=tuple(curve for curve in curves if curve is not None), regions=regions)

@@ -46,7 +46,8 @@ from walkerlab.physics.solvers.system import Floats, State
 RANDOM_START = "random start"
 # rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
-ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+# relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
 # tolerances of steps during the search; gaits are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
@@ -57,11 +58,13 @@ MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
-FOLLOWING_TOLERANCE = 1e-6  # relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+# relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+FOLLOWING_TOLERANCE = 1e-6
 # largest relative distance from the prediction; beyond it the gait belongs to another branch
 MAX_STATE_JUMP = 0.05
 MAX_PERIOD_JUMP = 0.02
-MAX_RETREATS = 5  # halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+# halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+MAX_RETREATS = 5
 # random starts: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank
 # whose knee was free at heel strike
 MIN_START = np.array([0.0, -1.0, -1.0, -1.0])
@@ -287,6 +290,7 @@ class SlopeBranch:
         gait is lost.
         """
         s = float(np.cbrt(slope))
+        # Below the seed's slope, a guess between the limit and the seed is good enough to start there.
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
             return 0.0, None
@@ -317,6 +321,7 @@ class SlopeBranch:
 
     def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
         s = math.exp(log_s)
+        # The residual is in units of z, which is proportional to s.
         effort = Effort(FOLLOWING_TOLERANCE * s, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
         gait = gait_near(self.step_map, unscale(s, expected), s**3, effort)
         if isinstance(gait, NotConverged):
@@ -328,6 +333,7 @@ class SlopeBranch:
 
 
 def unscale(s: float, y: Floats) -> Floats:
+    # The slope is s^3, and y[0] contains it.
     return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
 
 
@@ -454,9 +460,11 @@ class Search:
         d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
+        # The first coordinate was drawn as the angle between the legs. With both feet on the slope it determines the
+        # stance leg's.
         starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
         if self.walker.legs_differ:
-            self.draw_strides(starts)
+            self.search_strides(starts)
             return
         gaits = [(record.cycle.z, record.cycle.DP) for record in self.records]
         results = self.looking.solve_starts(strike_section(self.walker), gaits, starts)
@@ -466,8 +474,8 @@ class Search:
             elif gait == NEW_GAIT and not self.stands(z):
                 self.keep(z, RANDOM_START)
 
-    def draw_strides(self, starts: Floats) -> None:
-        """Solve the map of a stride from starts (starts, d)."""
+    def search_strides(self, starts: Floats) -> None:
+        """Look for fixed points of the stride map near each start (starts, d), and keep those that are new."""
         quick = map_over_slope(self.walker, SEARCH_TOLERANCES)
         effort = Effort(NEAR_RESIDUAL, MAX_START_EVALUATIONS, SMALLEST_MOVE)
         for start in starts:
@@ -476,6 +484,7 @@ class Search:
                 self.keep(gait.z, RANDOM_START)
 
     def stands(self, z: Floats) -> bool:
+        # With both feet on the slope, this sum with the stance leg counted twice is the angle between the legs.
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
@@ -486,6 +495,7 @@ class Search:
         cycle = gait_near(self.step_map, z, float(self.walker.slope), effort, STRIDE if self.walker.legs_differ else 1)
         if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
             return False
+        # Only the exact solution shows that a rough one belongs to a known gait.
         if self.record_hit(cycle.z, by):
             return True
         gait = measure_gait(self.walker, self.units, cycle)

@@ -65,6 +65,7 @@ def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIE
     stride = gait.stride(gait.z, gait.p)
     if stride.outcome is not Outcome.WALKED:
         return None
+    # The root turns the multiplier of a stride into that of a step.
     radius = float(np.abs(multipliers_of(stride.DP)).max()) ** (1.0 / gait.step_map.stride)
     quantities = dict(zip(GAIT_QUANTITIES, (*mean_quantities(stride), radius), strict=False))
     for names, of in WALK_QUANTITIES.items():
@@ -111,6 +112,7 @@ def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_Q
     """Differentiate a gait's quantities with respect to the parameter, or return nothing if the step map fails at
     nearby values.
     """
+    # A fourth-order quotient errs by h^4 and by rtol / h, which are of the same size at the fifth root of rtol.
     h = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale
     along = np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
@@ -160,6 +162,7 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
         return stride.steps[-1].z if stride.outcome is Outcome.WALKED else None
 
     moved = derivative(step_from, h)
+    # `moved` is A guess + dP/dp.
     return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
 
 
@@ -205,16 +208,18 @@ def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) ->
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))
+    # A conjugate has the same magnitude everywhere, so it does not count as another multiplier.
     distinct = [
         value for value in values if abs(value - values[largest]) > 0.0 and abs(value.conj() - values[largest]) > 0.0
     ]
     meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in distinct)
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")
+    # chain rule of |m|^(1 / steps)
     of_step = float(abs(values[largest])) ** (1.0 / steps - 1.0) / steps
     towards = of_step * (values[largest].conjugate() / abs(values[largest]))
     slope = (towards * (left[largest] @ change @ right[:, largest])).real
-    # absolute values: errors of A's elements may cancel by chance
+    # Use absolute values, because the errors of A's elements might cancel by chance.
     off = of_step * (np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest]))
     return make_gradient(float(slope), float(off))
 

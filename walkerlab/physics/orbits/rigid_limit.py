@@ -86,6 +86,7 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass).depth
+    # From the config's ground on, the push-off shortens with the square root of the stiffness.
     brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
@@ -140,6 +141,7 @@ class Limit:
             step = contact_step(near)
             check = self.gait(changed, near, CHECK_TOLERANCE)
             off = step.period_s - self.period_s
+            # Without a check, the whole difference from the rigid gait counts as numerical error.
             distance = Distance(
                 setting,
                 step.period_s,

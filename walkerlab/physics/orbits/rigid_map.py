@@ -68,7 +68,8 @@ MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # one for each number of tangent columns
 LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this time
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+# in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+SHORTEST_STEP = 0.05
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL = 1e300
@@ -104,6 +105,7 @@ def strike_section(walker: RigidModel) -> StrikeSection:
     origin = np.zeros(2 * n)
     basis = np.zeros((d, 2 * n))
     origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
+    # With both feet on the slope, the legs' angles have a constant sum.
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
@@ -119,14 +121,25 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     """
     psi = stance + walker.slope
     straight = walker.E[STRAIGHT]
+    # height of the hip above the centre of the swing foot's arc, which is one radius above the slope
     raised = hip_height(walker, np.full(2, stance)) - walker.swing_radius
     length, ahead = (f(walker.swing_hip_x, walker.swing_hip_y) for f in (math.hypot, math.atan2))
     if abs(raised) >= length:
         return None
     behind = math.acos(raised / length)
+    # derivative of -acos(raised / length)
     rate = (math.cos(psi) * walker.hip_x - math.sin(psi) * walker.hip_y) / (length * math.sin(behind))
     swing = ahead - behind - walker.slope
     return stance * straight[:, STANCE] + swing * straight[:, SWING], straight[:, STANCE] + rate * straight[:, SWING]
+
+
+def section_basis(section: StrikeSection, z: Floats) -> Floats:
+    """Return the derivatives (d, 2 n) of the state with respect to the section coordinates at z (d,)."""
+    if section.curved is None:
+        return np.asarray(section.basis)
+    basis = np.array(section.basis)
+    basis[0, : basis.shape[1] // 2] = valid(angles_on_slope(section.curved, float(z[0])))[1]
+    return basis
 
 
 def state_on_section(walker: RigidModel, z: Any) -> State:
@@ -240,6 +253,7 @@ class RigidStepper(local):
         """Walk until `strikes` is full or the walk ends, and return the outcome and the number of completed steps."""
         method.counts[:BUDGET] = 0
         method.counts[BUDGET] = min(strikes.time.size * self.budget, ENDLESS)
+        # The method chooses its first step itself, so a result does not depend on the walk before.
         method.clock[H_NEXT] = 0.0
         status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
         return Outcome(status), completed
@@ -253,6 +267,7 @@ class RigidStepper(local):
         times  of samples, from the start of the step
         """
         m = start.size
+        # One column for each value of the start, and a zero column for the rise.
         y = np.concatenate((start, TANGENT_SCALE * np.eye(m + 1, m).ravel()))
         strikes: HeelStrikes = new_heel_strikes(1, y.size, True, *floor, m + 1)
         strikes.lift[1, m] = TANGENT_SCALE
@@ -278,6 +293,7 @@ class RigidStepper(local):
         z = np.array([z for z, _ in gaits]).reshape(-1, d)
         DP = np.array([DP for _, DP in gaits]).reshape(-1, d, d)
         results = np.zeros(len(starts), np.int64)
+        # At a fold, I - DP is singular.
         solve_from_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, results)
         return results
 
@@ -336,6 +352,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
                 distance = 0.0
                 remaining = 0.0
                 for i in range(d):
+                    # z + (I - DP)^-1 (P(z) - z) is where Newton's method with the gait's derivative would go.
                     off = z[i] - gaits.z[gait, i]
                     distance = max(distance, abs(off))
                     for j in range(d):
@@ -351,6 +368,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
             solve(system, memory.pivots, move, 0, d)
         else:
             share *= 0.5
+            # The start itself leads to no step.
             if least == NO_RESIDUAL or share < SMALLEST_MOVE:
                 return NO_GAIT
         for i in range(d):
@@ -371,7 +389,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is an example."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is any walker."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:
@@ -461,32 +479,35 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return None
-        walker, units, (d, m), steps = unit.walker, unit.units, unit.section.basis.shape, heights_m.size - 1
+        units, (d, m), steps = unit.units, unit.section.basis.shape, heights_m.size - 1
         rises, nearest = unit.floor(z, heights_m)
         walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
         if walk.outcome is not Outcome.WALKED:
             return None
-        starts = np.vstack((state_on_section(walker, z), walk.strikes.after))
+        starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
-        kicks = [unit_kicks(unit, start) for start in starts[1:-1]] if kicked else []
+        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
+        kicks = [unit_kicks(*unit.swinging(step), starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
         lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
         columns = np.zeros((count, m))
         since = np.zeros(count)
-        columns[:given] = along[:d].T @ unit.section.basis
+        columns[:given] = along[:d].T @ section_basis(unit.section, z)
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
         for step, start in enumerate(starts[:-1]):
+            walker, section = unit.swinging(step)
             room = LAST_SAMPLE * (touches[step + 1] - touches[step])
             times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
-            tangents = self._exact.differentiate(unit.section, start, (rises[step : step + 2], nearest), times)
+            tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
             if tangents is None:
                 return None
             moved = np.column_stack((columns, lifts[step + 1]))
             before, after = moved @ tangents.before, moved @ tangents.after
             lengths = step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
+            # The times of samples are fixed, so a step that begins later is sampled earlier.
             samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
             parts.append((moved @ tangents.waits, lengths, after[:, STANCE], tangents.rates, samples))
             columns = after
@@ -577,15 +598,15 @@ def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
     return np.where(swaps, angles[..., ::-1], angles)
 
 
-def unit_kicks(unit: SimilarWalker, start: Floats) -> Floats:
+def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Floats:
     """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
 
     Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
     there. s makes such a change as large as the rates, on average.
     """
-    free = unit.section.basis[1:]
-    rates = coordinates_of(unit.walker, start)[1:]
-    M = free[:, start.size // 2 :] @ mass_matrix(unit.walker, start) @ free[:, start.size // 2 :].T
+    free = section.basis[1:]
+    rates = coordinates_of(walker, start)[1:]
+    M = free[:, start.size // 2 :] @ mass_matrix(walker, start) @ free[:, start.size // 2 :].T
     kicks = np.linalg.inv(np.linalg.cholesky(M))
     return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
 

@@ -75,6 +75,7 @@ class GaitOnMap(NamedTuple):
         if self.step_map.stride == 1:
             return [self]
         first, second = (step for step in self.stride(self.z, self.p).steps)
+        # From the other section, the second step comes first.
         other = self._replace(z=first.z, A=first.DP @ second.DP, swing=self.swing + 1)
         return sorted((self, other), key=lambda gait: gait.leg)
 
@@ -134,7 +135,7 @@ def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and the disturbed step's response (None if either fails). `times` scales the difference step."""
+    """Return norms and response of the disturbed step, or None if a walk falls. `times` scales the difference step."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def step_after(size: float) -> Floats | None:
@@ -158,6 +159,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 def largest_survived(stands: Callable[[float], bool], unit: float, width: float = BISECTION_WIDTH) -> float:
     """Return the size up to which every disturbance is survived, at most MAX_DISTURBANCE times `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
+    # Sizes are tried from the smallest on, so that all sizes below the result are survived.
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
         return MAX_DISTURBANCE * unit
@@ -207,6 +209,7 @@ def rough_walks(steps: Floats, max_steps: int) -> RoughWalks:
     if failed == 0:
         return RoughWalks(total, None, steps.size, capped, "lower-bound")
     if capped:
+        # Maximum likelihood for a constant probability of failing in each step: total steps per failure.
         return RoughWalks(total / failed, total / failed / math.sqrt(failed), steps.size, capped, "censored")
     error = float(steps.std(ddof=1)) / math.sqrt(failed) if failed > 1 else None
     return RoughWalks(total / failed, error, steps.size, 0, "all-failed")

@@ -77,6 +77,7 @@ class ScaledStarts:
         """
         if self.gait is None:
             return None
+        # `np.resize` repeats the gait's steps as often as the walk needs.
         period, length = np.resize(self.gait, (walk.periods_s.size, 2)).T
         off_period = np.abs(walk.periods_s - period)
         off_length = np.abs(walk.lengths_m - length)
@@ -146,6 +147,7 @@ def margins(
             else:
                 bad = change
                 failure = trial
+            # Only halvings count, not the steps before the first failure.
             halvings += failure is not None
         results.append(Margin(name, 1.0 + sign * good, failure))
     return results
@@ -184,6 +186,7 @@ def smallest_change(
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
             nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
+            # Evaluated one at a time, the cheap walk first: most points need no more.
             both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))

@@ -31,8 +31,8 @@ class Units(NamedTuple):
     def impulse(self) -> float:
         return self.mass * self.length / self.time
 
-    def size_of(self, unit: str) -> float:
-        """Return the walker's unit, in SI, with the dimension of `unit` (as in the config).
+    def natural_unit(self, unit: str) -> float:
+        """Return the walker's natural unit, in SI, for a quantity with the config's `unit`, such as 'N m'.
 
         Raises KeyError if unknown.
         """
@@ -55,6 +55,7 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
     scales = {
         **dict.fromkeys(("A", "B", "unpaired"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
+        # Stiffness and torque have the dimension of an energy, because angles have none.
         "laws": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
         "push_off": 1.0 / units.impulse,
         **dict.fromkeys(("radius", "swing_radius", "foot_x", "foot_y", *HIPS), 1.0 / length),
@@ -62,6 +63,7 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
 
     def similar(model: RigidModel) -> RigidModel:
         scaled = {name: scale * model[name] for name, scale in scales.items()}
+        # The components of gravity follow from the new g.
         return change_slope(
             replace_fields(model, {"mass": 1.0, "leg_length": 1.0, "gravity": 1.0, **scaled}), model.slope
         )

@@ -37,9 +37,11 @@ LONG_PERIOD = "long-period seed"
 SHORT_PERIOD = "short-period seed"
 SCAN = 400  # number of samples that bracket a root
 LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
-LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
+# rad, angle between the legs at which the long-period seed is accurate to a percent
+LONG_AMPLITUDE = 0.05
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
+# largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
+MAX_GROWTH = 30.0
 # matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
 # state into theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
@@ -75,6 +77,7 @@ def linear_modes(walker: RigidModel) -> Modes | None:
     # det(K - x M) = first x^2 - 2 half x + last
     first, last = np.linalg.det(M), np.linalg.det(K)
     half = 0.5 * (K[0, 0] * M[1, 1] + K[1, 1] * M[0, 0]) - K[0, 1] * M[0, 1]
+    # One positive and one negative root: the stance leg falls over, the swing leg swings.
     if not last < 0.0 < first:
         return None
     # root of the polynomial times `first`, without cancellation
@@ -82,6 +85,7 @@ def linear_modes(walker: RigidModel) -> Modes | None:
     oscillating, growing = sorted((root / first, last / root))
     swinging = K - oscillating * M
     falling = K - growing * M
+    # The kernel of a singular symmetric matrix ((a, b), (b, c)) is spanned by (c, -b) and by (-b, a).
     V = np.array([[swinging[1, 1], -falling[0, 1]], [-swinging[0, 1], falling[0, 0]]])
     return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
 
@@ -163,6 +167,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
     def mismatch(h: Floats) -> Floats:
         swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
         falling = total[1] * np.tanh(modes.fall * h) / modes.fall * apart[0] * np.cos(modes.swing * h)
+        # Both terms have been divided by cosh, which would overflow. Division by h removes the root at mid-swing.
         return np.asarray((swinging - falling) / h)
 
     return first_root(mismatch, 2.0 * math.pi / modes.swing)
@@ -179,10 +184,12 @@ def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> Small
         z = np.asarray(np.linalg.solve(rows[:, :3], -rows[:, 3]), np.float64)
     except np.linalg.LinAlgError:  # with all masses in one place a heel strike is undetermined
         return None
+    # The angle between the legs is 2 (z[0] + 1) times the slope.
     if z[0] <= -1.0:
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
     per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
+    # With hardly any mass at the feet, the cube-root law already holds at this amplitude.
     if slope_for_loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
         return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))
@@ -224,6 +231,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
         bordered = np.empty_like(flow)
         bordered[..., :3, :] = SECTION_ROWS - strike @ end
         bordered[..., 3, :] = FEET_DOWN @ end
+        # Both feet are down if theta_1 + theta_2 = -2 phi, with phi = 1.
         bordered[..., 3, 3] += 2.0
         return bordered
 

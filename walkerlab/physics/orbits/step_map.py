@@ -124,7 +124,7 @@ class StepMap(Stepper, Protocol):
         return z
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample both legs' angles (times, 2) from the vertical in a disturbed walk, first swing leg first.
+        """Sample the angles (times, 2) of both legs in a disturbed walk; the leg that swings first is column 0.
 
         times_s  increasing times from the first heel strike on, all before the last heel strike
         """
@@ -195,10 +195,12 @@ class StepMap(Stepper, Protocol):
 def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: int = 0) -> tuple[Outcome | None, Floats]:
     """Return the outcome of steps from z (d,) at values near p, and the derivative (d,) of a step with respect to p."""
     # This second-order difference only steers predictors and Newton's method and enters no result.
+    # Relative to a value below the scale, so that the differences do not reach beyond zero.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, False, swing) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
+        # Values on this side give no valid walker or start, so the next formula is tried.
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)

@@ -34,7 +34,8 @@ PLANE_CELLS = (72, 36)
 ALL_FAILED = -1  # period of a cell in which every walk fails
 TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # number of steps that are dropped, and of steps that are examined
 CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # accuracy of a cell's gait
-UNSTABLE_OFFSET = 1e-3  # offset from an unstable gait; coordinates are of magnitude one
+# offset from an unstable gait; coordinates are of magnitude one
+UNSTABLE_OFFSET = 1e-3
 
 
 # Step map over the first parameter as a function of the second; None if there is no valid walker.
@@ -63,6 +64,7 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
         reach = DIFFERENCE_STEP * np.eye(x.size)
         neighbours = (gait(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
         points = [point for point in (gait(x), *neighbours) if point is not None]
+        # The differences below rely on the order of the neighbours, so none may be missing.
         if len(points) < 1 + 2 * x.size:
             return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
         centre = points[0]

@@ -32,6 +32,7 @@ from walkerlab.physics.solvers.system import Floats, block, derivative
 # With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
 # more work.
 SAFETY = 0.8
+# Limits of the change of a step, as in Hairer's dop853.f.
 SHRINK_MOST = 0.333
 GROW_MOST = 6.0
 EXPONENT = 1.0 / 8.0
@@ -124,6 +125,7 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
                     by_order_5[i] = fused(ERROR_WEIGHTS_5[j], K[j, start + i], by_order_5[i])
                     by_order_3[i] = fused(ERROR_WEIGHTS_3[j], K[j, start + i], by_order_3[i])
         for i in range(width):
+            # `at` is the state of the last stage, which is the solution.
             y[start + i] = at[start + i]
             scale = 1.0 / (method.atol + method.rtol * max(abs(y_old[start + i]), abs(y[start + i])))
             relative_5 = by_order_5[i] * scale
@@ -158,6 +160,7 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     clock = method.clock
     at = method.at
     slope = method.stages[LAST_STAGE]
+    # No step has been taken yet, so this row is free.
     ahead = method.stages[0]
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
     for i in range(method.y.size):
@@ -191,6 +194,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     K = method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):
+        # The derivative at the end of a step is the first stage of the next.
         y_old[i], K[0, i] = y[i], K[LAST_STAGE, i]
     limit = GROW_MOST
     outcome = OUT_OF_BUDGET
@@ -208,6 +212,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
             clock[H_NEXT] = max(clock[H_NEXT], h * growth) if last else h * growth
             return STEP_DONE
         counts[REJECTED] += 1
+        # As in Hairer's code, the step does not grow right after a rejection.
         limit = 1.0
         # the error may be infinite or not a number
         h *= change_of_step(error) if error < 1e300 else 0.1
@@ -215,6 +220,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
         if h <= SMALLEST_STEP * max(abs(t), 1.0):
             outcome = STEP_TOO_SMALL
             break
+    # Trial steps have overwritten the state and its derivative.
     for i in range(y.size):
         y[i], K[LAST_STAGE, i] = y_old[i], K[0, i]
     return outcome

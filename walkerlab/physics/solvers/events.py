@@ -19,9 +19,11 @@ from numpy.polynomial import polynomial
 
 from walkerlab.physics.kernels import kernel_part, pass_by_reference
 
+# beyond the end of the step, so that it loses every comparison with a real crossing
 NO_CROSSING = 2.0
 FALLING = -1
 RISING = 1
+# Two crossings this close, as a fraction of the step, are not told apart: bisection would never separate a double zero.
 MIN_PIECE = 2.0**-48
 ROOT_RESOLUTION = 2.0**-52  # resolution of a crossing, as a fraction of its piece
 DEPTH = 64  # maximum number of pieces on the stack
@@ -85,11 +87,15 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
     while top >= 0:
         low, high = ends[top, 0], ends[top, 1]
         signs = sign_changes(stack, top, size)
+        # Coefficients of one sign: the polynomial lies in their hull, so it has no zero here.
         if high <= after or signs == 0:
             top -= 1
             continue
+        # By Descartes' rule of signs, one change of sign means exactly one crossing, more changes only bound their
+        # number.
         if (signs == 1 and low >= after) or high - low < MIN_PIECE:
             top -= 1
+            # The removed piece stays in memory above the top of the stack.
             rising = stack[top + 1, 0] < 0.0
             turned = (stack[top + 1, 0] < 0.0) != (stack[top + 1, size - 1] < 0.0)
             if turned and direction != (FALLING if rising else RISING):
@@ -97,6 +103,7 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
             continue
         split(stack, top, size)
         middle = 0.5 * (low + high)
+        # The left half goes on top, so that the first crossing found is the earliest.
         ends[top, 0], ends[top, 1] = middle, high
         ends[top + 1, 0], ends[top + 1, 1] = low, middle
         top += 1
@@ -117,6 +124,8 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
     for i in range(1, finder.nodes.size):
         smallest = min(smallest, finder.values[event, i])
         largest = max(largest, finder.values[event, i])
+    # Between the nodes, a polynomial exceeds the range of its values by less than that range: Lebesgue's constant of
+    # these points is below 3 up to degree 12. The factor 8 leaves a wide margin.
     room = 8.0 * (largest - smallest)
     return smallest <= room and largest >= -room
 
@@ -138,6 +147,7 @@ def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> i
 def divide_out_zero(stack: Any, size: int) -> int:
     """Divide a zero at the start out of the polynomial at the bottom of the stack, and return its new size."""
     degree = size - 1
+    # For i > 0, b_i B_i of degree n is x times b_i (n / i) B_(i-1) of degree n - 1, and b_0 is the zero.
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i
     return degree
@@ -197,6 +207,8 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
         elif (value_c < 0.0) == (value_b < 0.0):
             b = c
             value_b = value_c
+            # Illinois: an end that stays twice gets half its value, since plain regula falsi would approach it ever
+            # more slowly.
             value_a = 0.5 * value_a if side == -1 else value_a
             side = -1
         else:

@@ -16,13 +16,15 @@ Jet = tuple[float, float, float]
 """A value with its first two derivatives in time."""
 Quintic = tuple[float, float, float, float, float, float]
 """Bernstein coefficients of a quintic polynomial over a step."""
-LAST_MOVE = 1e-4  # Newton stops below this fraction of the step; its error is about the square of its last move
+# Newton stops below this fraction of the step. Its error is about the square of its last move.
+LAST_MOVE = 1e-4
 MAX_ITERATIONS = 50
 
 
 @kernel_part
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
     """Return the quintic over a step of h (s) with the given values and derivatives at both ends."""
+    # In Bernstein form of degree 5, the first difference is h f' / 5 and the second h^2 f'' / 20.
     slope = 0.2 * h * start[1]
     bend = 0.05 * h * h * start[2]
     last_slope = 0.2 * h * end[1]
@@ -73,6 +75,7 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
         changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)
     if changes == 0:
         return NO_CROSSING
+    # `only_crossing` starts from the end of the step and knows neither `after` nor a zero at the start.
     if changes == 1 and not zero_at_start and after == 0.0:
         return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
     for i in range(6):
@@ -94,6 +97,8 @@ def only_crossing(quintic: Quintic) -> float:
             high = x
         else:
             low = x
+        # Where the quintic does not fall, Newton would leave the bracket. `low` is not inside it either, so bisection
+        # follows.
         new = x - value / slope if slope < 0.0 else low
         if not low < new < high:
             new = 0.5 * (low + high)

@@ -78,6 +78,7 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
 @kernel_part
 def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
+    # Written out, because in compiled code tuples of different lengths are different types: no loop can extend them.
     k2 = derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, A_2, (k1,)))
     k3 = derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, A_3, (k1, k2)))
     k4 = derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, A_4, (k1, k3)))

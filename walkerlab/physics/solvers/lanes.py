@@ -53,6 +53,7 @@ def spread_over(builder: Any, value: Any) -> Any:
     if value.type == VECTOR:
         return value
     undefined = ir.Constant(VECTOR, ir.Undefined)
+    # LLVM's way to repeat a number: put it into one element, then shuffle.
     first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, undefined, mask)
@@ -86,6 +87,7 @@ def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: 
 
         def generic(self, given: Any, named: Any) -> Any:
             if named or not all(_is_number(kind) for kind in given) or LANES not in given:
+                # None leaves all other arguments to numba's definitions.
                 return None
             return signature(LANES, *(LANES for _ in given))
 
@@ -180,6 +182,7 @@ def choose(context: Any, sign: Any, if_positive: Any, otherwise: Any) -> Any:
 def any_positive(context: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         positive = builder.fcmp_ordered(">", arguments[0], ir.Constant(VECTOR, [0.0] * WIDTH))
+        # One bit per lane, read as an integer.
         mask = builder.bitcast(positive, ir.IntType(WIDTH))
         return builder.icmp_unsigned("!=", mask, ir.Constant(ir.IntType(WIDTH), 0))
 

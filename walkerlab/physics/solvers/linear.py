@@ -61,6 +61,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
 @kernel_part
 def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
     """Solve A x = b with factors from `factor`. The solution overwrites b[first : first + n]."""
+    # All exchanges come first, because `factor` has exchanged whole rows.
     for k in range(n):
         best = pivots[k]
         if best != k:

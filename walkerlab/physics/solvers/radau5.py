@@ -47,6 +47,8 @@ P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0
 P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
+# The safety factor, KEEP_LOW and KEEP_HIGH, FRESH_RATE, the first step and MAX_NEWTON are the defaults of Hairer's
+# radau5.f (SAFE, QUOT1 and QUOT2, THET, H, NIT).
 RADAU_SAFETY = 0.9
 RADAU_SHRINK = 0.125
 RADAU_GROWTH = 8.0
@@ -134,6 +136,7 @@ def first_guess(method: Radau5, h: float) -> None:
     w = method.w
     dense = method.dense
     for i in range(method.y.size):
+        # Stages are relative to the start of the new step, where the last step's polynomial has this value.
         start = dense[0, i] + dense[1, i] + dense[2, i]
         for stage in range(3):
             s = 1.0 + RADAU_NODES[stage] * ratio
@@ -159,6 +162,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
         f2 = f[1, i]
         f3 = f[2, i]
         real[i] = INV_1[0] * f1 + INV_1[1] * f2 + INV_1[2] * f3 - GAMMA / h * w[0, i]
+        # Two real equations in w_2 and w_3 are one complex equation in w_2 + i w_3 with the eigenvalue alpha - i beta.
         re = INV_2[0] * f1 + INV_2[1] * f2 + INV_2[2] * f3 - (ALPHA * w[1, i] + BETA * w[2, i]) / h
         im = INV_3[0] * f1 + INV_3[1] * f2 + INV_3[2] * f3 - (ALPHA * w[2, i] - BETA * w[1, i]) / h
         method.move_pair[i] = complex(re, im)
@@ -184,6 +188,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
 @kernel_part
 def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     """Iterate until the stages are accurate enough, and return the number of iterations, or 0 if they diverge."""
+    # FNEWT of Hairer's radau5.f: well below the error of the step, but not below rounding.
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
     size_old = 0.0
@@ -197,6 +202,8 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
             rate = size / size_old
             if rate >= 0.99:
                 return 0
+            # Predicted size of the correction that remains after the last allowed iteration. If it is too large, more
+            # iterations are useless.
             ahead = rate ** (MAX_NEWTON - iteration) / (1.0 - rate) * size
             if ahead > 10.0 * tolerance:
                 return 0
@@ -274,6 +281,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
         if iterations == 0:
             method.counts[REJECTED] += 1
             control[SMOOTH] = 0.0
+            # An old Jacobian may be to blame, and a new one costs less than a shorter step.
             if control[FRESH] == 0.0:
                 refresh(method, system)
             else:
@@ -282,6 +290,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
             continue
         error = step_error(method, system, t, h, rejected or control[SMOOTH] == 0.0)
         safety = min(RADAU_SAFETY, RADAU_SAFETY * (1 + 2 * MAX_NEWTON) / (iterations + 2 * MAX_NEWTON))
+        # The embedded formula has order 3, so its error grows with the fourth power of the step.
         shrink = max(1.0 / RADAU_GROWTH, min(1.0 / RADAU_SHRINK, error**0.25 / safety))
         if error < 1.0:
             accept(method, system, t, t_end if last else t + h)
@@ -313,6 +322,8 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
         shrink = max(shrink, max(1.0 / RADAU_GROWTH, min(1.0 / RADAU_SHRINK, predicted)))
     control[ERROR_OLD], control[H_OLD] = max(1e-2, error), h
     h_new = h / shrink
+    # With the same Jacobian and step size the factored matrices serve again, which is worth more than a slightly longer
+    # step.
     if control[FRESH] == 0.0 and KEEP_LOW * h <= h_new <= KEEP_HIGH * h:
         return h
     return h_new

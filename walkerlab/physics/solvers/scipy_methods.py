@@ -80,6 +80,7 @@ def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any]
             raise OutOfBudgetError
         counts[RHS] += 1
         dy = np.empty(n)
+        # The machine code is compiled for contiguous arrays.
         code(system, t, np.ascontiguousarray(y), dy)
         return dy
 
@@ -109,6 +110,7 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
         options["jac"] = counting_jacobian(method, system, n)
     method.dense = None
     try:
+        # SciPy's solvers keep the array that they are given, and `advance` overwrites `method.y`.
         method.solver = method.new_solver(counting_rhs(method.counts, system, n), t, method.y.copy(), np.inf, **options)
     except OutOfBudgetError:
         method.solver = None

@@ -22,6 +22,7 @@ def unknowns(J: Any) -> int:
         return n
     for i in range(half):
         for j in range(n):
+            # Compared exactly: the Jacobian of equations of motion has these rows as literal zeros and ones.
             if J[i, j] != (1.0 if j == half + i else 0.0):
                 return n
     return half

@@ -82,13 +82,15 @@ def complete(drawing: Stage) -> Stage:
     A stage whose block has its own name is needed only by configs with that block.
     """
     needed = tuple(stage for stage in STAGES if drawing.name in stage.needed_by)
-    shown = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
+    shown_names = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
 
     def inputs(config: Config) -> tuple[str, ...]:
-        own = (stage.name for stage in needed if stage.name not in stage.requires or getattr(config, stage.name))
-        return (*drawing.inputs(config), *own)
+        needed_names = (
+            stage.name for stage in needed if stage.name not in stage.requires or getattr(config, stage.name)
+        )
+        return (*drawing.inputs(config), *needed_names)
 
-    return replace(drawing, inputs=inputs, if_current=(*drawing.if_current, *shown))
+    return replace(drawing, inputs=inputs, if_current=(*drawing.if_current, *shown_names))
 
 
 PIPELINE = Graph(

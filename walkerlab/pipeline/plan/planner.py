@@ -55,7 +55,7 @@ class Planner:
     def decide(self, stage: Stage) -> Step:
         """Decide whether to reuse, run or leave out a stage, after the same decision for its inputs.
 
-        Optional inputs outside this plan are looked up first; a damaged one is recorded as left out.
+        Optional inputs outside this plan are looked up first. If one is damaged, it is recorded as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
@@ -94,12 +94,12 @@ class Planner:
         return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
-        why = stage.why_unsuited(self.config)
+        reason = stage.why_unsuited(self.config)
         for name in () if stage.draws else stage.inputs(self.config):
-            if why is None and name in self.left_out:
-                why = f"it needs {name}: {self.left_out[name]}"
-        if why is not None:
-            return Step(stage, "leave out", why)
+            if reason is None and name in self.left_out:
+                reason = f"it needs {name}: {self.left_out[name]}"
+        if reason is not None:
+            return Step(stage, "leave out", reason)
         return self.results.find(stage, self._identity(stage), self.inputs(stage), force)
 
     def _identity(self, stage: Stage) -> Identity:
@@ -203,8 +203,8 @@ def results_to_show(
     """
     results = results_in(folder, stages, graph)
     outdated = why_outdated(folder, results, graph)
-    for stage, why in outdated.items():
-        warn(f"{folder.artifact(stage)} is out of date: {why}; {command(folder, graph[stage])} recomputes it.")
+    for stage, reason in outdated.items():
+        warn(f"{folder.artifact(stage)} is out of date: {reason}; {command(folder, graph[stage])} recomputes it.")
     with refusing_older(folder, outdated, graph):
         yield results
 

@@ -69,7 +69,7 @@ def resolve(
     else:
         read = load(path, sets, strides, name)
         source = source_of(path, runs)
-    refuse_what_makes_no_walker(read)
+    refuse_invalid_parts(read)
     for stage in PIPELINE.stages:
         stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
@@ -95,15 +95,15 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
         edited = load(file).config
     except ConfigError:
         return file.label, ["it is no longer valid"]
-    own = {key_of(change) for change in folder.changes}
+    changed_keys = {key_of(change) for change in folder.changes}
     # a setting in degrees changes the slope in radians, and angles of a start may follow from any setting
-    own |= {"slope_rad", "start"} if own else set()
+    changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
     before, after = (dict(flatten(dump)) for dump in dumps)
     return file.label, [
         f"{key} {brief(value)} -> {brief(after.get(key))}"
         for key, value in before.items()
-        if after.get(key) != value and own.isdisjoint((key, key.partition(".")[0]))
+        if after.get(key) != value and changed_keys.isdisjoint((key, key.partition(".")[0]))
     ]
 
 
@@ -122,7 +122,7 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
         )
 
 
-def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
+def refuse_invalid_parts(read: LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     config = read.config
     if not isinstance(config.walker, AssembledWalker):
@@ -158,7 +158,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
         return None
     config = config_text(folder)
     if config is None:
-        bad = "".join(f" {why}." for why in read_all(folder, stored_in(folder))[1].values())
+        bad = "".join(f" {reason}." for reason in read_all(folder, stored_in(folder))[1].values())
         raise ConfigError(
             f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )

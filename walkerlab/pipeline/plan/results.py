@@ -49,8 +49,10 @@ class Keys:
         again       as for `call_stage`; true for every stored result
         """
         once = {} if again else {"again": False}
-        own = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
-        return Identity(stage.name, own, input_keys, self.code_digest(stage.name, added_code(stage, own)))
+        dependencies = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
+        return Identity(
+            stage.name, dependencies, input_keys, self.code_digest(stage.name, added_code(stage, dependencies))
+        )
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
         """Return the digest of a stage's code, and of code of extensions that it uses, computed at the first call."""

@@ -88,17 +88,23 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return the options for what a recorded file does not state, as keys of a block. Each needs some flags."""
+    """Return options for facts that a recorded file does not state. They set keys of a block, and need some other
+    flags.
+    """
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
         Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
-        Option("--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line that angles are from."),
+        Option(
+            "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line from which angles are measured."
+        ),
         Option("--belt-speed", "belt_speed_m_s", "M/S", "Speed of a treadmill's belt.", "float"),
         Option("--fps", "fps", "N", "Frames per second of the film.", "float"),
         Option("--from-s", "from_s", "S", "Time at which the part to read begins.", "float"),
         Option("--to-s", "to_s", "S", "Time at which the part to read ends.", "float"),
-        Option("--min-likelihood", "min_likelihood", "P", "Likelihood of a marker below which it is a gap.", "float"),
+        Option(
+            "--min-likelihood", "min_likelihood", "P", "Likelihood below which a marker counts as missing.", "float"
+        ),
     )
     return tuple(replace(option, key=f"{block}.{option.key}", needs=needs) for option in options)
 
@@ -153,11 +159,14 @@ class Stage:
 
     def why_no_such_legs(self, config: Config) -> str | None:
         """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
-        # walkers made of parts have no key `leg_2`
-        one_leg = getattr(config.walker, "leg_2", ...) is None and config.push_off.leg_2 is None
-        if one_leg or not self.needs_equal_legs:
+        if not self.needs_equal_legs:
             return None
-        from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics
+        # Imported here: the command line's help needs neither, and equal legs need no mechanics.
+        from walkerlab.config.second_leg import states_second_leg
+
+        if not states_second_leg(config):
+            return None
+        from walkerlab.scene.rigid import have_different_legs
 
         return "the legs differ" if have_different_legs(config) else None
 
@@ -171,7 +180,7 @@ class Stage:
         if self.why_no_such_legs(config) is not None:
             raise ConfigError(
                 f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out walker.leg_2 and push_off.leg_2, or ask another stage, such as {', '.join(WALKED)}.",
+                f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add

@@ -79,7 +79,7 @@ def compile_plain_systems(config: Config) -> None:
 
 
 def compile_lanes(config: Config) -> None:
-    """Compile the walks of basins, which walk straight legs from several starts at once."""
+    """Compile the kernels of basins, which simulate walks on straight legs from several starts at once."""
     from walkerlab.physics.hybrid.rigid_lanes import two_legs
     from walkerlab.physics.orbits.basin import SECTION_SIZE, Attractors, walk_to_attractor
     from walkerlab.scene.rigid import rigid_walker
@@ -132,7 +132,9 @@ def build(folder: str) -> None:
 
 
 def write_machine_code(folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """Copy files from the cache to the package's folder, with what they depend on, which is returned."""
+    """Copy files from the cache to the package's folder. Store and return the versions and the processor that they
+    need.
+    """
     from walkerlab.physics.compiler import strip_bitcode
 
     folder.mkdir(exist_ok=True)

@@ -59,8 +59,8 @@ def call_stage(
             content = run(config, inputs, reporter, **arguments)
     except NoAnswer as error:
         partial_content = error.partial if isinstance(error.partial, Content) else Content()
-        why = {"no_answer": {"message": error.message, "advice": error.advice}}
-        return replace(partial_content, summary={**partial_content.summary, **why}, complete=False)
+        reason = {"no_answer": {"message": error.message, "advice": error.advice}}
+        return replace(partial_content, summary={**partial_content.summary, **reason}, complete=False)
     if not isinstance(content, Content):
         raise TypeError(f"{module}.run returned {type(content).__name__}, not Content")
     return content
@@ -196,9 +196,9 @@ class Executor:
         number = self._total - len(self._left) + 1 + len(self._running)
         total = max(self._total, number)
         place = [f"{number} of {total}"] if total > 1 else []
-        why = [step.reason] if step.reason != NOT_THERE else []
+        reason = [step.reason] if step.reason != NOT_THERE else []
         expected = step.found.provenance.took_s if isinstance(step.found, Stored) else None
-        reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
+        reporter = self.reporter.begin(stage.name, ", ".join(place + reason), expected)
         return RunningStage(step, task, reporter, time.perf_counter())
 
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
@@ -274,9 +274,9 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     """Whether at least two of the stages are independent and can run in parallel."""
     needed: dict[str, set[str]] = {}
     for stage in stages:
-        own = {name for name in stage.results(config) if name in needed}
-        needed[stage.name] = own.union(*(needed[name] for name in own))
-    return any(len(needed[stage.name]) < place for place, stage in enumerate(stages))
+        inputs = {name for name in stage.results(config) if name in needed}
+        needed[stage.name] = inputs.union(*(needed[name] for name in inputs))
+    return any(len(needed[stage.name]) < index for index, stage in enumerate(stages))
 
 
 def short_reason(why: str) -> str:

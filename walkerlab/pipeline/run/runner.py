@@ -54,13 +54,13 @@ class StageReport:
             "wall_s": self.wall_s,
             "left_out": [asdict(entry) for entry in self.left_out],
         }
-        own = {key: value for key, value in self.summary.items() if key not in (*common, "no_answer")}
+        findings = {key: value for key, value in self.summary.items() if key not in (*common, "no_answer")}
         error = {} if self.no_answer is None else {"error": self.no_answer.as_json()}
         stages = [
             {"stage": step.stage.name, "action": step.action, "reason": step.reason, "wall_s": step.wall_s}
             for step in self.steps
         ]
-        return common | own | {"stages": stages} | error
+        return common | findings | {"stages": stages} | error
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from walkerlab.pipeline.run.workers import SizedExecutor, WorkerDiedError, Worke
 from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 
 SCOUTS: Final = 2
-"""Size of the first batch, which runs alone; it compiles the kernels once and measures the run time of a unit."""
+"""Size of the first batch. It runs alone, so that the kernels are compiled only once, and shows the time of a unit."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
@@ -24,7 +24,8 @@ SHARES: Final = 3
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
 """Errors that indicate a bug; a retry would only repeat them."""
 MAX_DEATHS: Final = 12
-"""Maximum number of worker deaths before the first result; beyond it the machine is the cause, not the work."""
+"""Maximum number of worker deaths before the first result. If there are more, the cause is the machine, not the work.
+"""
 
 
 NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, before it had computed one unit"

@@ -34,7 +34,7 @@ from walkerlab.physics.kernel_cache import cache_root
 
 SOON_S = 0.02
 CALLED_BACK = "_raw_object_cache"
-"""Prefix of the names of functions that LLVM calls after compiling or loading; errors raised in them are lost."""
+"""Prefix of the names of functions that LLVM calls after compiling or loading. Errors raised in them are lost."""
 
 STORING_PATIENCE_S = 1.0
 """Time that a command has to store finished results after its parent has ended."""
@@ -117,7 +117,7 @@ class WorkerTimeoutError(Exception):
 
 
 @dataclass(frozen=True)
-class Told:
+class CallMessage:
     """Message that a running call sends."""
 
     value: Any
@@ -176,7 +176,7 @@ class Worker:
         work = pickle.dumps(call)
         with contextlib.suppress(OSError):  # a dead worker is noticed because its answer is missing
             self._line.send_bytes(work)
-        while isinstance(message := self._receive(timeout_s), Told):
+        while isinstance(message := self._receive(timeout_s), CallMessage):
             if hear is not None:
                 hear(message.value)
         if message.error is not None:
@@ -184,11 +184,11 @@ class Worker:
         value: R = message.value
         return value
 
-    def _receive(self, timeout_s: float | None) -> Told | Answer:
+    def _receive(self, timeout_s: float | None) -> CallMessage | Answer:
         try:
             if not self._line.poll(timeout_s):
                 raise WorkerTimeoutError
-            message: Told | Answer = self._line.recv()
+            message: CallMessage | Answer = self._line.recv()
         except (EOFError, OSError):
             raise WorkerDiedError(self.ended()) from None
         return message
@@ -216,7 +216,7 @@ class Worker:
 
 
 class SizedExecutor(Executor):
-    """Executor that runs `size` calls at the same time, or 0 if it runs each call immediately, in this process."""
+    """Executor with a `size`: number of calls that run at the same time, or 0 if each runs in this process."""
 
     size: int
 
@@ -286,7 +286,7 @@ def map_in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index; low ranks start first; give long calls low ranks, so that no call runs alone at the end
+    rank   rank of an index. Low ranks start first; long calls should have them, so that no call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -309,7 +309,7 @@ class LeaveError(BaseException):
 def tell(value: Any) -> None:
     """Send a message to the parent process."""
     assert _lines, "only calls in a worker send messages"
-    _lines[0].send(Told(value))
+    _lines[0].send(CallMessage(value))
 
 
 _lines: list[Connection] = []

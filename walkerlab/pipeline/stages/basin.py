@@ -57,7 +57,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqr
 REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
-FAILED = UNREACHED - 1  # class of a cell whose walk fails
+FAILED = UNREACHED - 1  # code of a cell whose walk fails
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -65,13 +65,13 @@ TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angula
 def run(
     config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
-    """Walk from every cell that the checkpoint lacks, then from the subcells of cells at the basin's edge.
+    """Simulate walks from every cell that the checkpoint lacks, then from the subcells of cells at the basin's edge.
 
     checkpoint  cells that an earlier run completed
     jobs        maximum number of processes
 
-    Raises ConfigError if the contact model has no contact block, NoAnswer if its pads should fit a gait that does
-    not exist.
+    Raises ConfigError for the contact model without a contact block, NoAnswer if the pads need a contact gait and
+    there is none.
     """
     gait = inputs["fixedpoint"].summary
     rigid = rigid_walker(config)
@@ -113,7 +113,7 @@ def run(
 
 
 def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
-    """Repeat the walks of evenly spread cells at tighter tolerances, and count those that end differently."""
+    """Repeat the walks from evenly spaced cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     tighter = question.tightened().walk_to_ends(window.starts(cells))
     otherwise = (tighter.outcome != ends.outcome[cells]) | (tighter.attractor != ends.attractor[cells])
@@ -121,7 +121,7 @@ def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str
 
 
 def window_of(config: BasinConfig, z: list[float]) -> Window:
-    """Build the config's grid around the gait's section coordinates z (3)."""
+    """Build the grid of starts around the section coordinates z (3) of the gait."""
     settings = config.basin
     axes = tuple(COORDINATES.index(name) for name in settings.plane)
     rate = math.sqrt(config.gravity_m_s2 / config.walker.leg_length_m)
@@ -154,7 +154,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.scaled import scale_for_map, starts_of
+    from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps
@@ -163,7 +163,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     answer = contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
     scene = replace(scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
-    starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
+    starts = build_scaled_starts(scene, rigid, state, steps, answer, tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
     return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
@@ -171,8 +171,8 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
-        name: Variable(window.cell_centres(place), (name,), UNITS[axis], TEXTS[axis])
-        for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
+        name: Variable(window.cell_centres(index), (name,), UNITS[axis], TEXTS[axis])
+        for index, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }
 
     def grid_variable(values: Any, text: str) -> Variable:
@@ -183,8 +183,8 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
         "outcome": grid_variable(ends.outcome, "how the walk ended; codes in attribute outcomes"),
         "attractor": grid_variable(ends.attractor, "index of the attractor that was reached; -1: none"),
         "steps": grid_variable(ends.steps, "steps taken"),
-        "steps_to_settle": grid_variable(settled, "steps until the attractor was reached; 0: none was"),
-        "walking": grid_variable(walking, "fraction of the cell that walks; edge cells: from their subcells"),
+        "steps_to_settle": grid_variable(settled, "steps until the attractor was reached; 0: never"),
+        "walking": grid_variable(walking, "fraction of the cell that walks; at the basin's edge, of its subcells"),
     }
     held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
@@ -217,7 +217,7 @@ def summary(settings: Basin, window: Window, ends: WalkEnds, walking: Floats, qu
 
 
 def gaussian(window: Window) -> Floats:
-    """Return weights of the cells, with sum 1, from a normal distribution around the window's centre."""
+    """Return the weight of each cell in a normal distribution around the window's centre. The sum is 1."""
     off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
     weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
@@ -227,7 +227,7 @@ def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping
     """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing if no
     cell fails.
     """
-    # the distance is accurate to the size of a cell
+    # The distance is only as accurate as a cell is small.
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}
@@ -238,7 +238,7 @@ def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
-    """Rigid model whose walks are classified by their ends."""
+    """Rigid model, with the rules that classify the ends of its walks."""
 
     rigid: RigidModel
     walker: Walker  # the unit walker
@@ -249,7 +249,7 @@ class RigidQuestion:
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # minimum number of walks for which starting processes saves time
     tolerances: tuple[float, float] = (RTOL, ATOL)
-    pads: ClassVar[None] = None  # its ground has none
+    pads: ClassVar[None] = None  # the rigid model's ground has no pads
 
     @property
     def aperiodic(self) -> bool:
@@ -265,7 +265,7 @@ class RigidQuestion:
         return rows
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
-        """Walk from section coordinates z (n, 3), SI, until each walk ends or reaches an attractor."""
+        """Simulate walks from section coordinates z (n, 3), SI, until each ends or reaches an attractor."""
         scaled = z * np.array(self.scale)
         return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
@@ -277,7 +277,9 @@ class RigidQuestion:
 
 @dataclass(frozen=True, eq=False)
 class ContactQuestion:
-    """Contact model whose walks are classified. At the start the stance foot just touches and rolls without slip."""
+    """Contact model, with the rules that classify the ends of its walks. At the start of a walk the stance foot just
+    touches the ground and rolls without slip.
+    """
 
     scene: ContactScene
     rigid: RigidModel
@@ -297,12 +299,12 @@ class ContactQuestion:
         return [{"period": len(gait), "period_s": period_s, "step_length_m": length_m}]
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
-        """Walk from section coordinates z (n, 3), SI."""
+        """Simulate walks from section coordinates z (n, 3), SI."""
         rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
-        """Walk from section coordinates z (3), SI, and return outcome, attractor and number of steps."""
+        """Simulate a walk from section coordinates z (3), SI. Return outcome, attractor and number of steps."""
         state = state_on_section(self.rigid, z)
         walk = self.starts.walk_from(start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
@@ -319,13 +321,13 @@ Question = RigidQuestion | ContactQuestion
 def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
 ) -> list[WorkUnit]:
-    """Divide cells into work units of `at_once` cells, named by their first cells. Each cell takes `walks` walks."""
+    """Divide cells into work units of `at_once` cells, each named by its first cell. Each cell needs `walks` walks."""
     groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
-    """Walk from the centres of cells, and return their outcomes, attractors and step counts as one flat list."""
+    """Simulate walks from the centres of cells. Return their outcomes, attractors and step counts as one flat list."""
     ends = question.walk_to_ends(window.starts(np.array(cells)))
     return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 

@@ -22,11 +22,11 @@ from walkerlab.pipeline.stages.walk import (
     content_of_walk,
     legs,
     measure_pace,
-    numbers_of,
     rigid_start,
+    rotation_variables,
     step_asymmetry,
     steps_of,
-    turning,
+    summarise_walk,
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
@@ -50,7 +50,7 @@ SCUFFED = (
 
 
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides.
+    """Simulate `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
 
@@ -63,7 +63,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     tolerances = tolerances_of(config, steps)
     interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
-    tell_unresolved_slip(tolerances.atol, scene, progress)
+    warn_of_unresolved_slip(tolerances.atol, scene, progress)
 
     def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
@@ -76,7 +76,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
 
 
-def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
+def warn_of_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
     """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
@@ -88,7 +88,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
 
 def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
     """Return the asymmetry of a walk's last stride, with that of the times from touch to lift, leg 2 minus leg 1."""
-    # leg 2 stands in the first step of a stride; the foot that stood last may not have lifted
+    # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
     count = walk.steps - walk.steps % STRIDE
     if not count or walk.stance_s.size < count:
         return {}
@@ -99,7 +99,7 @@ def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
-    numbers = numbers_of(walk)
+    numbers = summarise_walk(walk)
     return {
         **numbers,
         **add_stance_time(numbers, walk),
@@ -195,7 +195,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     variables = variables_over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
         shanks, thighs = layout.knees.T.tolist()
-        variables |= turning("shank", angle[:, shanks], velocity[:, shanks])
+        variables |= rotation_variables("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
@@ -206,7 +206,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
         variables |= variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
-        variables |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+        variables |= rotation_variables(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
     return variables
 
 
@@ -217,7 +217,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     """
     kinetic, potential, total = sample_energies(scene.walker, samples).T
     driven = samples.driven_J.T
-    lost = samples.dissipated_J
+    losses = samples.dissipated_J
     walker = scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
     return variables_over_time(
@@ -225,7 +225,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,
         total_energy_J=total,
-        **{loss.variable: lost[:, place] for place, loss in SAMPLED.items()},
+        **{loss.variable: losses[:, place] for place, loss in SAMPLED.items()},
         **({"push_off_J": driven[0], "hip_J": driven[1]} if driven.any() else {}),
-        residual_J=total + lost.sum(axis=1) - driven.sum(axis=0) - total[:1],
+        residual_J=total + losses.sum(axis=1) - driven.sum(axis=0) - total[:1],
     )

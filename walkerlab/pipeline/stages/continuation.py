@@ -34,7 +34,7 @@ from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
-SHORTEST_REACH = 1e-9  # fraction of the span; a branch that covers less counts as a single gait
+SHORTEST_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
 TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
@@ -50,13 +50,14 @@ class FamilyQuestion:
 
     def start_values(self) -> list[float]:
         """Return the values at which the search looks for gaits, the config's own value first."""
-        own = self.parameter.value_in(self.config)
+        current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
-        return [*([own] if own in self.span else []), *(float(value) for value in spread)]
+        return [*([current] if current in self.span else []), *(float(value) for value in spread)]
 
     @property
     def stride(self) -> int:
-        return steps_of_stride(self.config, self.parameter)
+        parameters = (self.parameter, *(() if self.second is None else (self.second.parameter,)))
+        return max(steps_of_stride(self.config, each) for each in parameters)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -143,15 +144,9 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     if question.models != (RIGID,) and config.contact is None:
         raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
     question.refuse_ends("continuation")
-    if second is not None and question.stride > 1:
-        raise ConfigError(
-            "continuation.second: curves over a second key need two equal legs, but those of this walker differ.",
-            "Leave out the second key.",
-            ("continuation", "second"),
-        )
     if second is not None:
         second.refuse_ends("continuation", "second")
-        own = second.parameter.value_in(config)
+        current = second.parameter.value_in(config)
         span = second.span
         name = second.parameter.key
         if second.parameter.path == question.parameter.path:
@@ -159,9 +154,9 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
                 f"continuation.second: {name} is already the parameter that gaits are followed over",
                 "Choose another key.",
             )
-        if own not in span:
+        if current not in span:
             raise ConfigError(
-                f"continuation.second: {name} is {own:g} in the config, outside {span.least:g} to {span.most:g}",
+                f"continuation.second: {name} is {current:g} in the config, outside {span.least:g} to {span.most:g}",
                 "Curves begin at the config's own value; choose a range around it.",
             )
         second.touched("second")
@@ -182,7 +177,9 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
         config = question.config
         plane = Plane(parameter.vary(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
-    return FamilySearch(model, map_of(question.config), question.span, seeds, periods, block.points, progress, plane)
+    step_map = map_of(question.config)
+    step_map.stride = question.stride
+    return FamilySearch(model, step_map, question.span, seeds, periods, block.points, progress, plane)
 
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
@@ -199,7 +196,7 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
 
 
 def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
-    """Find a gait of the contact model at the first start value that has one, or return None if no value has one."""
+    """Find a gait of the contact model at the first start value that has one, or return None if none has."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
@@ -258,7 +255,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
 
 
 def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Yield a row for each branch of a model: its range of values, stable ranges and ends."""
+    """Yield a row for each branch of a model: its values, the ranges in which it is stable, and its ends."""
     for branch in family.branches:
         ranges = branch.stable_ranges
         widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
@@ -308,9 +305,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Solve for evenly spread gaits at tighter tolerances, and return the largest changes, or None if no
-    gait exists.
-    """
+    """Solve again for a sample of gaits at tighter tolerances. Return the largest changes, or None without a gait."""
     # Gaits are solved again, not only simulated, so that the change includes the residual of Newton's method.
     step_map = family.step_map
     every = [(branch, point) for branch in family.branches for point in branch.points]
@@ -333,14 +328,16 @@ def sample_again(family: Family) -> dict[str, Any] | None:
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
-    """Describe branch ends where walks fail, with causes in the ground, and crossings where gaits trip over pads."""
+    """Describe the branch ends at which walks fail because of the ground, and the crossings at which gaits trip over
+    pads.
+    """
     for branch in family.branches:
         gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
             outcome = end.reason.partition(":")[0]
             if outcome_of(outcome) is not None:
-                why = ground_causes(outcome, config, family.model == CONTACT)
-                text = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
+                reason = ground_causes(outcome, config, family.model == CONTACT)
+                text = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *reason])
                 yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": text}
         for crossing in branch.crossings:
             if crossing.monitor.name == "tripped":
@@ -353,12 +350,12 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 
 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
-    """Return the side of a crossing on which the monitored quantity exceeds its limit."""
+    """Return the side of a crossing ('above' or 'below') on which the monitored quantity exceeds its limit."""
     assert step_map is not None, "a followed branch has a step map"
-    place = list(step_map.monitors).index(crossing.monitor)
+    index = list(step_map.monitors).index(crossing.monitor)
     limit = crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
-    beyond = limit is not None and nearest.monitors[place] > limit
+    beyond = limit is not None and nearest.monitors[index] > limit
     return "Above" if beyond == (nearest.value > crossing.value) else "Below"
 
 
@@ -441,7 +438,7 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
-    """Report a gait that continues in neither direction, because the step map is discontinuous there."""
+    """Describe a gait that cannot be followed in either direction, because the step map is discontinuous there."""
     gait = branch.points[0]
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
     return {"what": what, "why": f"it continues in neither direction: {branch.ends[1].reason}", "saves": ""}
@@ -461,10 +458,10 @@ def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> li
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
     if question.stride > 1:
-        entries.append(("attractors, and gaits of other numbers of steps", "the legs differ"))
+        entries.append(("attractors, their regions, and gaits of other numbers of steps", "the legs differ"))
     entries += [
         (f"the {family.model} model's plane of both keys", "the second key does not affect this model")
         for family in families
         if second is not None and family.branches and not second.touches(family.model)
     ]
-    return [{"what": what, "why": why, "saves": ""} for what, why in entries]
+    return [{"what": what, "why": reason, "saves": ""} for what, reason in entries]

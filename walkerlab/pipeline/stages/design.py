@@ -38,10 +38,10 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 
 SOLVED: Final = Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # gap of the difference quotients of largest disturbances, as a fraction of the bounds' range
-FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances, so that searches are not lost in its noise
+DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; a coarser one would add noise that misleads the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
-MEETING: Final = 1e-3  # gap between the magnitudes of the two largest multipliers below which they count as meeting
+MEETING: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
     "start": Label("SI", "start of the search"),
@@ -53,7 +53,7 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum.
 
-    checkpoint  results of the searches of an earlier run; new ones are added
+    checkpoint  results of searches that an earlier run completed; new results are added
 
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
@@ -66,9 +66,9 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     lower, upper = np.array(list(design.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in design.keep.items()}
     question = DesignProblem(quantity, -1.0 if design.maximise else 1.0, lower, upper, keep, gaits.gait_at)
-    own = np.array([parameter.value_in(config) for parameter in parameters])
+    current = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
-    own_gait = gaits.gait_at(own)
+    own_gait = gaits.gait_at(current)
     own_z = gaits.z
 
     def search(number: int, start: Floats) -> DesignSearch:
@@ -78,7 +78,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         gaits.z = own_z
         if name in checkpoint.kept:
             entry = np.array(checkpoint.kept[name])
-            counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + own.size))
+            counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + current.size))
             point = gaits.gait_at(x)
             gaits.counts = before + counts.astype(int)
             return DesignSearch(x, point, float(gradient_norm[0]))
@@ -89,7 +89,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             checkpoint.keep(name, [*counts.tolist(), result.gradient_norm, *result.x.tolist(), *z.tolist()])
         return result
 
-    searches = search_from_starts(question, own, design.starts, config.seed, search)
+    searches = search_from_starts(question, current, design.starts, config.seed, search)
     if not searches or searches[0].point is None:
         raise NoAnswer(f"no gait of the {design.model} model within the bounds", WIDEN_ADVICE)
     best = searches[0]
@@ -97,7 +97,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     ends = count_optima(question, searches)
     start = {} if own_gait is None else {"start_value": own_gait.numbers[quantity], "start": dict(own_gait.numbers)}
     progress.start("design: robustness at the start and at the optimum")
-    robust = {"start": {} if own_gait is None else gaits.robustness_at(own), "best": gaits.robustness_at(best.x)}
+    robust = {"start": {} if own_gait is None else gaits.robustness_at(current), "best": gaits.robustness_at(best.x)}
     # 12 digits, so that a bound appears as typed
     optimum = {key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)}
     answer = {
@@ -125,7 +125,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     }
     rows = [
         {"to": key, "start": float(begins), "best": value}
-        for (key, value), begins in zip(optimum.items(), own, strict=True)
+        for (key, value), begins in zip(optimum.items(), current, strict=True)
     ]
     content = Content({"optimum": rows_group(rows, LABELS, "row", "row")}, answer)
     if not ends:
@@ -146,12 +146,12 @@ def refuse(config: DesignConfig) -> None:
     parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]
     for key in design.over:
         refuse_unread("design.over", key, config, (design.model,))
-    own = [parameter.value_in(config) for parameter in parameters]
+    current = [parameter.value_in(config) for parameter in parameters]
     bounds = list(design.over.values())
-    corners = np.column_stack((own, bounds)).T
-    for place, parameter in enumerate(parameters):
-        for bound in bounds[place]:
-            neighbours = (np.where(np.arange(len(parameters)) == place, bound, corner) for corner in corners)
+    corners = np.column_stack((current, bounds)).T
+    for index, parameter in enumerate(parameters):
+        for bound in bounds[index]:
+            neighbours = (np.where(np.arange(len(parameters)) == index, bound, corner) for corner in corners)
             if all(config_with(config, parameters, x.tolist()) is None for x in neighbours):
                 raise parameter.refusal(config, bound, ("design", "over"))
 
@@ -165,7 +165,7 @@ def keys_on_bound(design: Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters. Each search for a gait starts at the last one found."""
+    """Gait and gradients as functions of the parameters. Each search for a gait starts from the last gait found."""
 
     def __init__(
         self,
@@ -257,7 +257,7 @@ class Gaits:
     ) -> dict[str, float]:
         """Differentiate the largest disturbances by a parameter, from gaits at values `gap` below and above.
 
-        If there is no gait on one side, the difference to the gait in the middle is taken.
+        If there is no gait on one side, the difference from the gait in the middle is used.
         """
         if not self.largest:
             return {}

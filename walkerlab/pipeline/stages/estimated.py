@@ -23,7 +23,7 @@ def refuse_model(config: ContactConfig, block: Identify) -> None:
 
 
 def refuse_keys(config: ContactConfig, block: Identify) -> None:
-    """Raise ConfigError for a key that is not a parameter of the models, or a value or prior that cannot be used."""
+    """Raise ConfigError for a key that is no parameter of the models, and for a value or prior that cannot be used."""
     refuse_values(config, "fit", block.fit, block.models)
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, block.models)
     for key, (value, sigma) in block.prior.items():
@@ -39,16 +39,16 @@ def refuse_values(
     config: ContactConfig, where: str, values: Mapping[str, Sequence[float] | None], models: Sequence[str]
 ) -> None:
     asker = ("identify", where)
-    for key, own in values.items():
+    for key, bounds in values.items():
         parameter = parameter_of(key, config, asker)
         refuse_unread(".".join(asker), key, config, models)
-        for value in own or ():
+        for value in bounds or ():
             if parameter.config_at(config, value) is None:
                 raise parameter.refusal(config, value, asker)
-        if own is not None and len(own) > 1 and not own[0] <= parameter.value_in(config) <= own[1]:
+        if bounds is not None and len(bounds) > 1 and not bounds[0] <= parameter.value_in(config) <= bounds[1]:
             raise ConfigError(
                 f"{'.'.join(asker)}: {key} starts at {parameter.value_in(config):g} {parameter.unit}, outside its "
-                f"bounds {own[0]:g} to {own[1]:g}",
+                f"bounds {bounds[0]:g} to {bounds[1]:g}",
                 "Widen the bounds, or change the start (--set).",
                 asker,
             )

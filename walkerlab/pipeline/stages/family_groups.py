@@ -28,8 +28,9 @@ from walkerlab.pipeline.store.content import Group, Variable, columns, labelled,
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
-MOTIONS_OF_BRANCH, LONGEST = 12, 4  # number of gaits per branch whose walks are stored; maximum period of such a gait
-STRIDE = 2  # number of steps after which the legs have their initial roles again
+MOTIONS_OF_BRANCH = 12  # number of gaits per branch whose walks are stored
+LONGEST = 4  # steps, maximum period of these gaits
+STRIDE = 2  # number of steps after which the legs have the same roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 SAMPLE_STRIDE = 3  # every third sample between heel strikes is stored
@@ -58,7 +59,7 @@ MARKS = {
     "after": Label("1", "index of the point before the bifurcation; -1: none", name="mark_after"),
     "kind": replace(KIND, name="mark_kind"),
     "periods": Label("s", "step durations of the gait at the bifurcation", ("step",), name="mark_step_period"),
-    "angles": Label("rad", "stance angles of the gait at the bifurcation", ("step",), name="mark_stance_angle"),
+    "angles": Label("rad", "stance leg angles of the gait at the bifurcation", ("step",), name="mark_stance_angle"),
 }
 
 
@@ -66,9 +67,9 @@ def groups(
     families: Sequence[Family], answer: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
     second: Parameter | None,
 ) -> dict[str, Group]:  # fmt: skip
-    """Build a group for each branch and curve, and for each model's bifurcations, exponents and attractor.
+    """Build a group for each branch, each curve, and the bifurcations, exponents and attractor of each model.
 
-    answer  summary, whose branches, bifurcations and curves are stored as tables too
+    answer  summary of the stage; its branches, bifurcations and curves are also stored as tables
     second  second parameter, if gaits are followed over a plane
     """
     value = {"value": Label(parameter.unit, parameter.key)}
@@ -136,7 +137,7 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return the flip where a branch begins, with the steps of the parent's gait listed twice, or an empty list."""
+    """Return a list of the flip at which a branch begins, with two periods of the gait there, or an empty list."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
@@ -161,9 +162,9 @@ def branch_group(
         **columns(points, {**value, **POINTS}, "point"),
         **real_and_imaginary("multiplier", multipliers, ("point", "multiplier"), "multiplier"),
     }
-    for place, monitor in enumerate(monitors):
+    for index, monitor in enumerate(monitors):
         label = Label(monitor.unit, monitor.meaning)
-        variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
+        variables[monitor.name] = labelled([point.monitors[index] for point in points], label, "point")
     if marks:
         labels = MARKS | {"value": Label(value["value"].unit, "value at the bifurcation", name="mark_value")}
         variables |= columns(marks, labels, "mark")

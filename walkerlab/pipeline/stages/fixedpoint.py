@@ -43,7 +43,7 @@ STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Find the gaits of each set of equations.
 
-    again  whether the advice then names nearby gaits, which takes a second
+    again  whether to name nearby gaits if none is found, which takes a second
 
     Raises NoAnswer if the config's own set has no physical gait.
     """
@@ -66,7 +66,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 
 
 def suggest_nearby(config: RigidConfig) -> str:
-    # imported here: most walkers have a gait
+    # Imported here, because it is needed only if no gait is found.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
     return suggest_gaits(config)
@@ -112,8 +112,8 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
     return {**sets[config.equations], **driven, "state_names": list(state_names(config)), "equation_sets": sets}
 
 
-def numbers_of(gait: RigidGait) -> dict[str, Label]:
-    """Return the labels of a gait's quantities, including the knees' if it has any."""
+def labels_of_gait(gait: RigidGait) -> dict[str, Label]:
+    """Return the labels of a gait's quantities, with that of the knee strike for walkers with knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | KNEE_LABELS
 
 
@@ -125,7 +125,7 @@ def gait_summary(gait: RigidGait) -> dict[str, Any]:
         "stride_multipliers": pairs_of(gait.stride_multipliers),
         "gait_steps": [{"period_s": period, "length_m": length} for period, length in gait.steps],
         "asymmetry": gait.asymmetry,
-        **values_by_column(gait, numbers_of(gait)),
+        **values_by_column(gait, labels_of_gait(gait)),
         "step_period_s": gait.period,
         "work_per_step_J": gait.work,
         "found_by": list(gait.found_by),
@@ -145,7 +145,9 @@ def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     found_by = np.array(["; ".join(gait.found_by) for gait in gaits])
     objections = np.array(["; ".join(gait.objections) for gait in gaits])
     variables = {
-        **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
+        **rows_group(
+            gaits, {"state": STATE, **labels_of_gait(gaits[0])}, GAIT, "gait, shortest period first"
+        ).variables,
         **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), text),
         "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
         "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starts that found this gait"),

@@ -26,8 +26,8 @@ from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, MeasuredFile
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
-from walkerlab.scene.identification import identify_walk
-from walkerlab.scene.parameter import config_with, parameter_of
+from walkerlab.scene.identification import LEGS, identify_walk
+from walkerlab.scene.parameter import SLOPE, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), o
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Fit the measured walk.
+    """Fit the config's parameters to the measured walk.
 
     Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
     """
@@ -115,7 +115,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     problems = list[NoAnswer]()
     for measured in file.divisions():
         try:
-            answers.append(divide_again(file, ask, ask(measured)))
+            answers.append(refit_with_new_strikes(file, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -126,20 +126,20 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     return max(answers, key=lambda answer: answer.verdict.usable)
 
 
-def divide_again(
+def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope and sensors move heel strikes, and keep the old fit if the new
-    one is bad.
-    """
+    """Fit again if the identified slope, sensors or soles move heel strikes, or keep the old fit if this one is bad."""
     if not before.measured.sampled:
         return before
-    slope_change = identified_config(file.config, before).slope_rad - file.config.slope_rad
-    touch_sum = 2.0 * (before.sensors[OFFSET] - slope_change)
-    if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
+    identified = identified_config(file.config, before)
+    touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
+    same_soles = rigid_walker(identified).alike
+    if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
+    on_slope = SLOPE.config_at(identified, file.config.slope_rad)
     try:
-        refit = ask(file.divide_at(touch_sum))
+        refit = ask(file.divide_at(touch_sum, on_slope))
     except (ConfigError, NoAnswer):
         return before
     return refit if refit.verdict.usable else before
@@ -177,6 +177,9 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
+        "leg_differences": [asdict(difference) for difference in result.leg_differences],
+        "other_leg_differences": [asdict(difference) for difference in result.other_differences],
+        "first_leg": None if result.first_leg is None else asdict(result.first_leg),
         "measured_spectral_radius": None if result.measured_radius is None else asdict(result.measured_radius),
         "models": [{**asdict(model), "reason": "; ".join(model.reasons)} for model in result.models],
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
@@ -196,7 +199,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a prior, with its distance from the walk's own estimate in standard errors of the difference."""
+    """Return a prior, with its distance from the estimate by the walk alone, in standard errors of the difference."""
     return {
         "key": pull.key,
         "value": pull.value,
@@ -232,7 +235,7 @@ def step_group(result: Identification) -> Group:
 
 
 def angle_residuals(result: Identification) -> Floats:
-    """Return measured minus predicted angles (samples, 2) on the most probable floor."""
+    """Return the measured minus the predicted angles (samples, 2), given the most probable floor heights."""
     return result.fitted.residuals[-result.measured.angles_rad.size :].reshape(-1, 2)
 
 
@@ -257,19 +260,21 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
-    """Build the identified and measured motions of the first steps, or return an empty mapping for kneed walkers (no
-    shank angles are read).
+    """Build the identified and measured motions of the first steps, or an empty mapping for kneed walkers,
+    because their shank angles are not read.
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 
     config  config of the identified walker
     """
+    measured = result.measured
     walker = rigid_walker(config)
+    # the leg that swings first is shown as leg 1
+    walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
-    if walker.kneed:
+    if walker.kneed or walker.exchanged.kneed:
         return {}
-    measured = result.measured
     shown = np.flatnonzero(measured.step < SHOWN_STEPS)
     sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
     every = max(1, shown.size // SHOWN_SAMPLES)

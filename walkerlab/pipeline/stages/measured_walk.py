@@ -25,7 +25,7 @@ from walkerlab.exchange.columns import (
 from walkerlab.exchange.leg_angles import legs, mend_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
-from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
+from walkerlab.exchange.walk_in_steps import PLAUSIBLE, RecordedSteps, divide_into_steps, is_plausible, sum_over_level
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import (
     LEG_ANGLE,
@@ -35,7 +35,6 @@ from walkerlab.physics.estimation.measurements import (
     split_into_steps,
 )
 from walkerlab.physics.estimation.prediction import OFFSET
-from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
@@ -51,7 +50,7 @@ MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
+SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -62,7 +61,7 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 class MeasuredFile:
-    """The file of an `identify` block, as steps or angles, as `block.level` says. It is read once.
+    """Contents of the file that an `identify` block names, as steps or angles (`block.level`). The file is read once.
 
     Raises ConfigError if it cannot be read.
     """
@@ -74,7 +73,11 @@ class MeasuredFile:
         self.steps = read_steps(self.path, block, config.slope_rad) if block.level == "steps" else None
         if self.steps is None:
             self.walk, self.resolution = read_angles(block, config.slope_rad)
-            self.find_steps = cache(partial(divide_into_steps, self.walk, rigid_walker(config), block.data))
+            self.find_steps = cache(partial(self.steps_of, config))
+
+    def steps_of(self, config: RigidConfig, touch_sum_rad: float) -> RecordedSteps:
+        """Find the steps in the recorded walk of a config's walker."""
+        return divide_into_steps(self.walk, rigid_walker(config), self.block.data, touch_sum_rad)
 
     def divisions(self) -> Iterator[MeasuredWalk]:
         """Yield the walk in steps. Angles may be divided in several ways.
@@ -98,9 +101,12 @@ class MeasuredFile:
         if problem is not None and not divided:
             raise problem
 
-    def divide_at(self, touch_sum_rad: float) -> MeasuredWalk:
-        """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`."""
-        steps = self.find_steps(touch_sum_rad)
+    def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
+        """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
+
+        config  config of the walker; None for that of the file
+        """
+        steps = self.find_steps(touch_sum_rad) if config is None else self.steps_of(config, touch_sum_rad)
         if steps.touch_time_s.size < MIN_STEPS:
             raise ConfigError(
                 f"{self.path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk."
@@ -109,10 +115,10 @@ class MeasuredFile:
         angles = legs(self.walk)[:, ::-1] if steps.swapped else legs(self.walk)
         touches = np.append(0.0, steps.touch_time_s)
         measured = split_into_steps(self.walk.time_s - steps.origin_s, angles, touches, touch_sum_rad)
-        return replace(measured, resolution={LEG_ANGLE: self.resolution})
+        return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
 
     def doubts(self) -> tuple[str, ...]:
-        """Return sentences about oddities in the angles, and about their corrections."""
+        """Describe, in sentences, the oddities of the angles and how they were handled."""
         if self.steps is not None:
             return ()
         try:
@@ -134,15 +140,14 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     yield 0.0
     if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
-    model = rigid_walker(config)
-    sums = sums_at_jumps(walk.time_s, legs(walk), lambda angles: np.asarray(feet_on_slope(model, *angles.T)))
+    sums = sums_at_jumps(walk.time_s, legs(walk), partial(sum_over_level, rigid_walker(config)))
     yield from (each for each in sums if each)
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
-    """Read the recording in the block's file, and return it with the smallest decimal place of its angles (rad).
+    """Read the recording in the block's file. Return it with the smallest decimal place of its angles (rad).
 
-    That is 0 for angles that are computed from markers.
+    The decimal place is 0 for angles that are computed from markers.
     """
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
@@ -162,7 +167,7 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
 
 def smallest_decimal(values: Floats) -> float:
     """Return the smallest decimal place that the values use: 0.001 for 0.72 and 0.725, 1 for whole numbers."""
-    return next((10.0**-place for place in range(16) if np.array_equal(np.round(values, place), values)), 0.0)
+    return next((10.0**-index for index in range(16) if np.array_equal(np.round(values, index), values)), 0.0)
 
 
 def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
@@ -196,7 +201,8 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
         values["touch_angle_rad"] = values["touch_angle_rad"] - tilt
     quantities = dict(zip(STEP_KINDS, (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE), strict=True))
     resolution = {quantities[name]: smallest for name, (_, smallest) in columns.items()}
-    return MeasuredWalk(period, values.get("length_m"), values.get("touch_angle_rad"), resolution=resolution)
+    lengths, angles = values.get("length_m"), values.get("touch_angle_rad")
+    return MeasuredWalk(period, lengths, angles, resolution=resolution, first_leg=block.first_leg)
 
 
 def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:

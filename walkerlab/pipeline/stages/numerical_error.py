@@ -83,22 +83,22 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
     """Return the largest change of the values (steps,) up to each step, or NaN where a walk has no value.
 
     period  steps after which the first walk repeats in the end, or 0
-    later   how many steps later the second walk takes the same steps, or None if it does not repeat
+    later   delay (steps) with which the second walk takes the same steps, or None if it does not repeat
 
-    Rounding decides with which step a walk begins to repeat itself, so a walk that has settled is compared with the
-    same step of the cycle, however many steps later it comes. If the second walk has not settled yet, the error of one
-    step stands in for the error of the cycle.
+    Rounding decides at which step a walk begins to repeat itself. So the steps of a walk that has settled are compared
+    with the same steps of the cycle, even if these come later. If the second walk has not settled yet, the error of
+    the cycle is estimated by that of one step.
     """
     count = min(len(first), len(second))
     values, others = (np.array(each[:count], float) for each in (first, second))
-    apart = np.abs(values - others)
-    largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
+    changes = np.abs(values - others)
+    largest = np.where(np.isnan(changes), np.nan, np.fmax.accumulate(changes))
     if not period or count < 2 * period:
         return largest
     end = count - 1 - (later or 0)
     steps = np.arange(count)
-    last = end - (end - steps) % period  # the last such step with a partner
-    between = apart[0] if later is None else np.abs(values[last] - others[last + later])
+    last = end - (end - steps) % period  # the last step with a counterpart in the second walk
+    between = changes[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
 
 

@@ -60,7 +60,7 @@ def refuse(config: PlanConfig) -> None:
     if not block.fit:
         raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
     if block.model == "both":
-        raise ConfigError("identify.model: both: a plan is for one model.", "Choose --model rigid or contact.")
+        raise ConfigError("identify.model is both, but a plan is for one model.", "Choose --model rigid or contact.")
     refuse_model(config, block)
     refuse_keys(config, block)
     for key in plan.errors:
@@ -91,7 +91,7 @@ def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, 
 
 
 def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
-    """Build the group of errors by number of steps, with gaps where the walk does not determine a parameter."""
+    """Build the group of errors by number of steps, with missing values for undetermined parameters."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
     return Group(
@@ -101,7 +101,7 @@ def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
                 np.array(errors, float),
                 ERROR_DIMENSIONS,
                 "SI",
-                "standard error in the key's unit; a gap if it is not determined",
+                "standard error in the key's unit; missing if the walk does not determine it",
                 missing=True,
             ),
         }

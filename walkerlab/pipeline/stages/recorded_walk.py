@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.schema import Config
 
-NOISY = 0.02  # noise over amplitude above which the times of single steps are off by several per cent
+NOISY = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -63,7 +63,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Return the walk without the camera's tilt, for which the legs' rates jump at the heel strikes."""
+    """Return the walk without the camera's tilt. With the right tilt the leg rates jump at the heel strikes."""
     tilt = find_tilt(walk, model)
     upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
     doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
@@ -107,7 +107,7 @@ def read_artifact(path: Path) -> Recording:
         groups = artifact.read(path).groups
     except (Damaged, IsADirectoryError) as error:
         raise ConfigError(
-            f"{path} is not a stored walk: {error}.", "Name simulate.h5 or contact-sim.h5 of a run."
+            f"{path} is not a stored walk: {error}.", "Give the file simulate.h5 or contact-sim.h5 of a run."
         ) from None
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:
@@ -117,8 +117,8 @@ def read_artifact(path: Path) -> Recording:
     for name, variable in group.variables.items():
         if variable.dims[:1] != ("time",) or name not in (*LEG_QUANTITIES, *WALKER_QUANTITIES) or name == TIME:
             continue
-        for place, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
-            column = f"{name} {place + 1}" if variable.values.ndim > 1 else name
+        for index, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
+            column = f"{name} {index + 1}" if variable.values.ndim > 1 else name
             columns[column], units[column] = values, variable.units
     return Recording(path, columns, units)
 
@@ -126,8 +126,8 @@ def read_artifact(path: Path) -> Recording:
 def content_of(
     block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps, doubts: Sequence[str]
 ) -> Content:
-    """Build the content, with the same names as for computed walks. It has energies and forces only if they were
-    recorded.
+    """Build the content, with the same names as for computed walks. Energies and forces are included only if
+    they were recorded.
     """
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)

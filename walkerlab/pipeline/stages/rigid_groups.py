@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
 from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, compute_in_turns, energy_at_touch
-from walkerlab.pipeline.stages.walk import COORDINATE, legs, steps_of, turning, variables_over_time
+from walkerlab.pipeline.stages.walk import COORDINATE, legs, rotation_variables, steps_of, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
 
@@ -28,12 +28,14 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 
 
 def rolled_distance(walker: RigidModel, turned: Any) -> Any:
-    """Return distances (m) rolled by the stance foot as its leg turns back by angles (rad)."""
+    """Return the distances (m) that the stance foot has rolled when its leg has turned back by angles (rad)."""
     return walker.radius * turned
 
 
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
-    """Build the group of the sampled quantities that `outputs` select, with both sides of each heel strike."""
+    """Build the group of the sampled quantities that `outputs` select, with a sample just before and just after each
+    heel strike.
+    """
     stance = stance_leg(samples)
     variables = {**variables_over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
     if "states" in scene.outputs:
@@ -85,7 +87,7 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
         if name.startswith("theta_1_"):  # the stance leg's shank is in line with its thigh
             angle = reorder_by_leg(np.column_stack((angle, samples.state[:, 1])), stance)
             rate = reorder_by_leg(np.column_stack((rate, samples.state[:, n + 1])), stance)
-        variables |= turning(name.split("_")[-1], angle, rate)
+        variables |= rotation_variables(name.split("_")[-1], angle, rate)
     return variables
 
 

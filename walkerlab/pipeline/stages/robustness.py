@@ -83,7 +83,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
         "mean_steps": Label("1", "mean number of steps to failure, or a lower bound"),
         "walks": Label("1", "walks"),
-        "capped": Label("1", "walks that were cut off"),
+        "capped": Label("1", "walks stopped at the maximum number of steps"),
         "method": Label("", "method of the mean"),
     },
     "sensitivity": {
@@ -103,7 +103,7 @@ def run(
     checkpoint: Checkpoint,
     jobs: int = 1,
 ) -> Content:
-    """Study each model.
+    """Study the robustness of the gait of each model.
 
     checkpoint  disturbances and walks that an earlier run computed
     jobs        maximum number of processes
@@ -156,9 +156,9 @@ def run(
         groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
     content = Content(groups, {**answer, "steps": config.robustness.steps})
     if unstable:
-        why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
+        reason = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
         raise NoAnswer(
-            why, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
+            reason, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
         )
     return content
 
@@ -168,15 +168,15 @@ def refuse(config: RobustnessConfig) -> None:
     block = config.robustness
     if block.model in (CONTACT, "both") and config.contact is None:
         raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or choose rigid.")
-    for place, key in enumerate(block.to or ()):
-        parameter_of(key, config, ("robustness", "to", place))
+    for index, key in enumerate(block.to or ()):
+        parameter_of(key, config, ("robustness", "to", index))
         refuse_unread("robustness.to", key, config, models_of(config))
     half = 0.5 * config.walker.leg_length_m
     for roughness in block.roughness_m:
         if roughness > half:
             raise ConfigError(
                 f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
-                "Give millimetres as 0.001.",
+                "The unit is metres: write 1 mm as 0.001.",
             )
 
 
@@ -193,7 +193,7 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
 
 
 def row_of(subject: ModelUnderTest, gait: GaitOnMap) -> dict[str, Any]:
-    """Return the beginning of a row: the model and, if the legs differ, the leg that swings in the disturbed step."""
+    """Return the start of a row: the model and, if the legs differ, the leg that swings in the disturbed step."""
     return {"model": subject.model} | ({"leg": gait.leg} if gait.step_map.stride > 1 else {})
 
 
@@ -239,7 +239,7 @@ def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, 
 
 
 def rough_ground_units(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Yield work units, each a batch of walks on rough ground."""
+    """Yield the work units of walks on rough ground, in batches."""
     block = config.robustness
     most = cap(subject.model, config)
     for roughness in block.roughness_m:
@@ -275,7 +275,7 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
 
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:
-    """Sample the beginning of the rigid model's first walk on the roughest ground, for a figure."""
+    """Sample the first steps of the rigid model on the roughest ground, for a figure."""
     gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
@@ -303,7 +303,7 @@ def sensitivities(
     progress: Progress,
     jobs: int,
 ) -> Rows:
-    """Return rows of derivatives in order of decreasing relative effect. Parameters of value 0 come last."""
+    """Return rows of derivatives in order of decreasing relative effect. Parameters with value 0 come last."""
     keys = numbers_read(subject, requested)
     label = f"robustness: gradients of the {subject.model} model"
     rows = list[dict[str, Any]]()
@@ -325,7 +325,7 @@ def sensitivities(
 
 def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
     """Return the derivatives with respect to one key, without cost of transport for a passive walker."""
-    # a passive walker's cost of transport is the sine of the slope
+    # The cost of transport of a passive walker is the sine of the slope, whatever its parameters.
     omitted = () if drives_of(subject.config) else ("cost_of_transport",)
     names = [name for name in GAIT_QUANTITIES if name not in omitted]
     return subject.gradients(parameter_of(key, subject.config), names)

@@ -10,14 +10,14 @@ from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.rigid_groups import groups
-from walkerlab.pipeline.stages.walk import content_of_walk, measure_pace, numbers_of, rigid_start
+from walkerlab.pipeline.stages.walk import content_of_walk, measure_pace, rigid_start, summarise_walk
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.omissions import rigid_walk_omissions
 from walkerlab.scene.rigid import rigid_scene
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides.
+    """Simulate `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
 
@@ -40,7 +40,7 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
 def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
     return {
-        **numbers_of(walk),
+        **summarise_walk(walk),
         **measure_pace(config, walk),
         "start_state": list(walk.start),
         "final_state": list(walk.final_state),

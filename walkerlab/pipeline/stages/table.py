@@ -34,9 +34,9 @@ def check_laws(config: Config) -> None:
         load("walkerlab.scene.contact:ground_laws")(contact)
 
 
-MODEL_HELP = "Model whose gaits to study."
+MODEL_HELP = "Model whose gaits are studied."
 ESTIMATED = (
-    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds.", "bounds-or-none"),
+    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, with optional bounds.", "bounds-or-none"),
     Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Known value, and its standard deviation.", "bounds"),
     Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate as well.", "texts"),
     Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
@@ -48,7 +48,7 @@ WALKS = (
     Stage(
         "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
         "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
-        needs_equal_legs=True, depends_on=dependency("files", "walkerlab.pipeline.stages.recorded_walk:digests"),
+        depends_on=dependency("files", "walkerlab.pipeline.stages.recorded_walk:digests"),
     ),
     Stage(
         "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
@@ -106,12 +106,12 @@ QUESTIONS = (
         "identify", "walkerlab.pipeline.stages.identify",
         "Estimate parameters of the walker from a measured walk, with error bars.",
         reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify", shown_by=DRAWINGS, finds="identified",
-        needs_equal_legs=True,
         depends_on=dependency("files", "walkerlab.pipeline.stages.measured_walk:digests"),
         options=(
             Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time.", "text"),
             *ESTIMATED,
             Option("--level", "identify.level", "steps|angles", "Kind of data."),
+            Option("--first-leg", "identify.first_leg", "1|2", "Leg of the first step in a table of steps.", "int"),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", "switch"),
             *recording_options("identify"),
@@ -122,7 +122,7 @@ QUESTIONS = (
     Stage(
         "plan", "walkerlab.pipeline.stages.plan",
         "Find which measurements, over how many steps, determine parameters of the walker.",
-        reads.PlanConfig, results_of("fixedpoint"), only_by="plan", shown_by=DRAWINGS, needs_equal_legs=True,
+        reads.PlanConfig, results_of("fixedpoint"), only_by="plan", shown_by=DRAWINGS,
         options=(
             *ESTIMATED, ERRORS_TO_REACH,
             Option("--steps", "plan.steps", "N", "Number of steps to report errors for.", "int"),

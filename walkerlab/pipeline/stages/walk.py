@@ -1,7 +1,7 @@
 """Parts shared by the stages that compute walks: start, stored groups, summary and numerical error.
 
-Both models store a walk under the same names, in the same shapes, with the same meanings; quantities that a model
-lacks are absent. Long walks are thinned: all samples of the first and last steps are stored, fewer of the others.
+Both models store a walk with the same names, shapes and meanings. Quantities that a model lacks are absent. Long walks
+are thinned: all samples of the first and last steps are stored, fewer of the others.
 """
 
 import math
@@ -39,11 +39,12 @@ MIN_REPEATED = 4
 MAX_REPEATED = 32
 """Number of steps at the end of a walk that are tested for repetition, or a quarter of all steps if that is more."""
 FEWEST_SETTLED = 8
-"""Smallest number of last steps in which repetition is looked for."""
+"""Repetition is looked for in at least this many of the last steps."""
 REPEATED = 1e-5
 """Steps repeat if they differ by less than this, relative to the first step."""
 REPEATED_AFTER_SETTLING = 1e-2
-"""Steps that repeat after two or more also differ by less than this, relative to the spread of the last steps."""
+"""If steps repeat only after two or more, they must also differ by less than this, relative to the spread of the steps.
+"""
 ON_GAIT = 1e-6
 """A walk starts on a gait if its second step differs from the first by less than this (relative)."""
 OFF_GAIT = 1e-2
@@ -66,7 +67,7 @@ STEP_LABELS: Final = {
     "state_before": Label("rad, rad/s", "state just before the touch", (COORDINATE,)),
     "state_after": Label("rad, rad/s", "state just after the touch, roles exchanged", (COORDINATE,)),
 }
-# a knee may not lock, and the last stance foot may not lift
+# missing where a knee does not lock or the last stance foot does not lift
 WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
 TIME_LABELS: Final = {
     "time": Label("s", "time"),
@@ -133,9 +134,9 @@ def content_of_walk(
     progress: Progress,
     again: bool,
 ) -> Content:
-    """Walk, store samples (thinned for long walks), and repeat the walk to measure the numerical error.
+    """Simulate a walk, store samples (thinned for long walks), and repeat it to measure the numerical error.
 
-    walk     called with tolerances and whether to sample; returns a `WalkRecord` with `samples`
+    walk     takes tolerances and whether to sample, and returns a `WalkRecord` with `samples`
     groups   returns the groups of a walk to store
     summary  returns the summary of a walk
     again    whether to repeat the walk, which takes two to three times as long as the walk itself
@@ -148,8 +149,8 @@ def content_of_walk(
     stored = groups(result)
     answer = summary(result)
     if not result.outcome.answered:
-        why = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
-        raise NoAnswer(why, answer["advice"], Content(stored, answer))
+        reason = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
+        raise NoAnswer(reason, answer["advice"], Content(stored, answer))
     if again:
         answer["numerical_error"] = numerical_error(answer, tolerances, lambda tighter: summary(walk(tighter, False)))
     return Content(stored, answer)
@@ -188,8 +189,8 @@ def variables_over_time(**values: ArrayLike) -> dict[str, Variable]:
     }
 
 
-def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
-    """Build angle and velocity of a torso (samples,) or of the shanks (samples, 2)."""
+def rotation_variables(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
+    """Build the variables of angle and angular velocity of a torso (samples,) or the shanks (samples, 2)."""
     labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
     dims = (TIME, LEG)[: np.ndim(angle)]
     return {
@@ -199,12 +200,14 @@ def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """Build the coordinate of the legs. They keep the numbers 1 and 2, whichever is the stance leg."""
+    """Build the coordinate of the legs. Each leg keeps its number, 1 or 2, whether it swings or stands."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `STEP_LABELS`. NaN and missing values of the last steps become gaps."""
+    """Build variables over steps, named as in `STEP_LABELS`. NaN and values that the last steps lack are stored as
+    missing.
+    """
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -251,26 +254,29 @@ def drive_measures(walk: WalkRecord) -> dict[str, Any]:
     }
 
 
-def settling(walk: WalkRecord) -> dict[str, int | None]:
+def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
     """Return how a walk on even ground settles.
 
     repeats_after  steps after which the last steps repeat, 0 if they do not
-    leaves_gait_at  number of the step with which a walk leaves a gait on which it begins; None if it does not
+    leaves_gait_at  number of the step with which a walk leaves the gait on which it starts, or None if it stays or
+                    starts elsewhere
     """
     if walk.steps < MIN_REPEATED or walk.foothold_height_m is not None:
         return {"repeats_after": 0, "leaves_gait_at": None}
     steps = np.column_stack((walk.periods_s / walk.periods_s[0], walk.lengths_m / walk.lengths_m[0]))
     off = np.abs(steps - 1.0).max(axis=1)
-    left = np.flatnonzero(off > OFF_GAIT)
+    departures = np.flatnonzero(off > OFF_GAIT)
     on_gait = off[1] < ON_GAIT
     return {
         "repeats_after": steps_to_repeat_last(steps),
-        "leaves_gait_at": int(left[0]) + 1 if on_gait and left.size else None,
+        "leaves_gait_at": int(departures[0]) + 1 if on_gait and departures.size else None,
     }
 
 
 def steps_to_repeat_last(steps: Floats) -> int:
-    """Return the number of steps after which the last steps (steps, n) repeat, in the longest end that does, or 0."""
+    """Return the number of steps after which the last steps (steps, n) repeat, or 0. The longest part that repeats
+    counts.
+    """
     longest = max(MAX_REPEATED, len(steps) // 4)
     ends = (longest >> halvings for halvings in range(longest.bit_length()))
     periods = (steps_to_repeat(steps[-end:]) for end in ends if end >= FEWEST_SETTLED)
@@ -281,14 +287,14 @@ def steps_to_repeat(steps: Floats) -> int:
     """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat, or 0 if never."""
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
-        apart = np.abs(steps[period:] - steps[:-period]).max()
-        # A walk that settles slowly, from side to side, almost repeats after two steps.
-        if apart < REPEATED and (period == 1 or apart < REPEATED_AFTER_SETTLING * spread):
+        difference = np.abs(steps[period:] - steps[:-period]).max()
+        # A walk that settles slowly, alternating about its limit, almost repeats after two steps.
+        if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0
 
 
-def numbers_of(walk: WalkRecord) -> dict[str, Any]:
+def summarise_walk(walk: WalkRecord) -> dict[str, Any]:
     """Summarise a walk of either model, with knee strikes for walkers with knees."""
     strikes = walk.knee_strike_time_s
     knee_strikes = (
@@ -303,7 +309,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "touch_times_s": walk.touch_time_s.tolist(),
         **knee_strikes,
         **last_stride(walk),
-        **settling(walk),
+        **describe_settling(walk),
         **drive_measures(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,

@@ -41,7 +41,7 @@ class Identity:
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
-    """Describe the differences between two identities, or return none if their keys are equal."""
+    """Describe the differences between two identities. There are none if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
         if old.input_keys.get(name) != new.input_keys.get(name):
@@ -95,7 +95,7 @@ class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure 
 
 
 class OtherLayout(Damaged):
-    """Error for an artifact of another version of this program. It needs no warning."""
+    """Error for an artifact in another program version's layout. Callers skip it without a warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,10 +129,10 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
     Raises StorageError if that fails; the old file is then intact.
     """
     root = root_attributes(content, identity, provenance, content.digest())
-    own = content.groups[""].attrs if "" in content.groups else {}
-    if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
-        raise ValueError(f"some of these root attributes have reserved names: {sorted(own)}")
-    image = hdf5.image(content.groups, {**root, **own})
+    attributes = content.groups[""].attrs if "" in content.groups else {}
+    if not attributes.keys().isdisjoint(ROOT_ATTRIBUTES):
+        raise ValueError(f"some of these root attributes have reserved names: {sorted(attributes)}")
+    image = hdf5.image(content.groups, {**root, **attributes})
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
     parts = content.groups, content.summary, content.timed
@@ -246,9 +246,9 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
     """
     if root.get("schema_version") not in READABLE:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
-    own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
+    attributes = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
     if "" in groups:
-        groups = {**groups, "": Group(groups[""].variables, own)}
+        groups = {**groups, "": Group(groups[""].variables, attributes)}
     facts = {name: json.loads(value) if name in NESTED else value for name, value in root.items()}
     identity = Identity(**{one.name: facts[one.name] for one in fields(Identity)})
     provenance = Provenance(**{one.name: facts[one.name] for one in fields(Provenance) if one.name in facts})

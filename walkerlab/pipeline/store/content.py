@@ -40,7 +40,7 @@ class Variable:
     units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text
     long_name: str  # meaning, as shown on axes and in tables
     timing: bool = False  # whether the values depend on run times; they are stored, but the digest omits them
-    missing: bool = False  # whether NaN is allowed, as the mark of a gap
+    missing: bool = False  # whether NaN is allowed, to mark missing values
 
     def __post_init__(self) -> None:
         """Convert the values to one of the four stored types and check the labels."""
@@ -134,8 +134,8 @@ class Content:
     @property
     def no_answer(self) -> NoAnswer | None:
         """Reason why the stage has no answer, with advice, or None if it has one."""
-        why = self.summary.get("no_answer", {})
-        return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
+        reason = self.summary.get("no_answer", {})
+        return None if self.complete else NoAnswer(reason.get("message", "no answer"), reason.get("advice", ""))
 
     @property
     def findings(self) -> dict[str, Any]:
@@ -267,7 +267,7 @@ def values_by_column(row: Any, labels: Mapping[str, Label]) -> dict[str, Any]:
 
 
 def column(values: Sequence[Any], label: Label, dim: str) -> Variable:
-    """Build a variable with one value per row. None becomes a gap or the `absent` value of the label."""
+    """Build a variable with one value per row. None becomes a missing value, or the `absent` value of the label."""
     if not any(value is None for value in values):
         return labelled(values, label, dim)
     absent = np.nan if label.absent is None else label.absent

@@ -1,4 +1,4 @@
-"""Values as CSV, safe to open in a spreadsheet."""
+"""Format values as CSV that is safe to open in a spreadsheet."""
 
 import csv
 import io
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""First character of a text that a spreadsheet would evaluate."""
+"""Pattern of the first character of texts that a spreadsheet would evaluate."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
-from walkerlab.extensions import foreign
+from walkerlab.extensions import external_extensions
 from walkerlab.pipeline.store.commit import commit_of_package
 from walkerlab.pipeline.store.files import as_text
 
@@ -84,7 +84,7 @@ def library_versions() -> dict[str, str]:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
             continue
-    return versions | {f"extension {found.name}": found.origin for found in foreign() if found.extension}
+    return versions | {f"extension {found.name}": found.origin for found in external_extensions() if found.extension}
 
 
 def git_commit() -> str | None:

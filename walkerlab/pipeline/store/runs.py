@@ -126,7 +126,7 @@ class RunFolder:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):
             return None
-        # Imported here: a folder without this file is not locked.
+        # Imported here, because it is not needed for a folder without this file, which is not locked.
         from filelock import FileLock, Timeout
 
         # A killed process leaves its file, but not its lock.
@@ -145,7 +145,7 @@ class RunFolder:
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
         the lock file cannot be created.
         """
-        # Imported here: a run that reuses everything needs no lock.
+        # Imported here, because a run that reuses everything needs no lock.
         from filelock import FileLock, Timeout
 
         from walkerlab.pipeline.store.provenance import command_line, utc_now
@@ -252,7 +252,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 
 
 def claim(folder: RunFolder, config: Config) -> None:
-    """Record in a folder which config its results belong to, and call it under the lock, before any result is written.
+    """Record in a folder which config its results belong to. Call this under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config` does.
     """

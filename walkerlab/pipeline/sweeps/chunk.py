@@ -83,8 +83,8 @@ def compute_point(
     except WalkerlabError as error:
         return Chunk((PointResult(key, "failed", error.message),), {})
     except Exception as error:
-        why = f"a bug: {type(error).__name__}: {error}"
-        return Chunk((PointResult(key, "failed", why, bug=traceback.format_exc()),), {})
+        reason = f"a bug: {type(error).__name__}: {error}"
+        return Chunk((PointResult(key, "failed", reason, bug=traceback.format_exc()),), {})
     return chunk_of(key, answer)
 
 

@@ -25,7 +25,7 @@ PAD_PITCH = "contact.pad_pitch"
 
 
 STATUS_TEXTS: Final = {
-    "outcome": "the stage's own outcome, or else whether it has an answer",
+    "outcome": "outcome of the stage if it has one, otherwise whether it has an answer",
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
 }
@@ -39,7 +39,7 @@ class SweepVariable:
     """Column of sweep results: a number, a list of numbers or a string for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
-        """Start with gaps only. `shape` is the shape of one value."""
+        """Start with missing values only. `shape` is the shape of one value."""
         self.kinds: set[type] = set()
         self.text = text
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
@@ -68,7 +68,7 @@ class SweepVariable:
         self.values[own] = array
 
     def typed(self) -> NDArray[Any]:
-        """Return the values in their own type if there are no gaps, otherwise as floats with gaps."""
+        """Return the values in their type, or as floats with NaN if some are missing."""
         if self.text or np.isnan(self.values).any():
             return self.values
         if self.kinds == {np.bool_}:
@@ -79,8 +79,8 @@ class SweepVariable:
 def types_in(values: Sequence[Any]) -> set[type]:
     """Return the types of the numbers in a nested list."""
     inner = [item for value in values if isinstance(value, list) for item in value]
-    own = {type(value) for value in values if not isinstance(value, list)}
-    return own | types_in(inner) if inner else own
+    types = {type(value) for value in values if not isinstance(value, list)}
+    return types | types_in(inner) if inner else types
 
 
 class Merge:
@@ -260,9 +260,9 @@ def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tup
     """Split a variable into columns, one for each entry of a list. Gaps are empty."""
     values = variable.values
     points = values.shape[:dimensions]
-    own = values.shape[dimensions:]
-    rows = values.reshape((int(np.prod(points)), *own))
-    for place in np.ndindex(own):
+    inner_shape = values.shape[dimensions:]
+    rows = values.reshape((int(np.prod(points)), *inner_shape))
+    for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)
         yield f"{name}{ending}", ["" if value != value else value for value in column]

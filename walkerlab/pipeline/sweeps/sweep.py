@@ -55,7 +55,7 @@ class Swept:
     question: SweptStage
     path: Path  # file of the sweep
     summary: Mapping[str, Any]  # summary stored in the file
-    reused: int  # number of points whose result existed
+    reused: int  # number of points whose stored result was reused
     wall_s: float  # total time
     bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped the computation of points
 
@@ -76,11 +76,11 @@ class Swept:
     def error(self) -> WalkerlabError:
         """Return the error for points that were not computed. All other points are stored."""
         message = f"{self.failed} of {len(self.question)} points were not computed"
-        why = f"`reason` in {self.path} says why."
+        reason = f"`reason` in {self.path} says why."
         if not self.bugs:
-            return NoAnswer(f"{message}; {why}", "The same command tries them again and keeps the rest.")
+            return NoAnswer(f"{message}; {reason}", "The same command tries them again and keeps the rest.")
         error = WalkerlabError(
-            f"{message}, at least one because of a bug; {why}", "Please report the traceback; the rest is stored."
+            f"{message}, at least one because of a bug; {reason}", "Please report the traceback; the rest is stored."
         )
         for bug in self.bugs:
             error.add_note(bug)
@@ -113,7 +113,7 @@ class SweepRun:
         self.keys = Keys(graph)
         keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
-        self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
+        self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
         # index of the first point with each key
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
@@ -237,8 +237,8 @@ class SweepRun:
             progress.advance(len(chunk.rows))
 
         def give_up(unit: WorkUnit, error: BaseException) -> None:
-            why = f"its worker died: {type(error).__name__}: {error}"
-            keep(Chunk((PointResult(unit.name, "failed", why),), {}))
+            reason = f"its worker died: {type(error).__name__}: {error}"
+            keep(Chunk((PointResult(unit.name, "failed", reason),), {}))
 
         todo = self._units(missing.tolist(), work)
         chunk_s = work.chunk_s or work.engine.chunk_s

@@ -192,8 +192,8 @@ class StageLine:
         return ", ".join(parts)
 
     def seconds_left(self) -> float | None:
-        """Predict the remaining time (s) from the rate so far or the last duration of the stage. None if it
-        is unknown.
+        """Predict the remaining time (s) from the rate so far or the last duration of the stage, or return
+        None if both are unknown.
         """
         computed = time.monotonic() - self.work_began
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:

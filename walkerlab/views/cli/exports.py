@@ -197,11 +197,11 @@ def figure(
     available = inputs.keys() | run.left_out.keys()
     outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in available))
     with refusing_older(folder, outdated):
-        why = illustration.why_left_out(stored, {})
-    if why is not None:
+        reason = illustration.why_left_out(stored, {})
+    if reason is not None:
         commands = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"Run {join_words(commands)} first." if commands else ""
-        raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
+        raise StaleError(f"{illustration.name} cannot be drawn: {reason}.", advice)
     left_out = stored.keys() <= inputs.keys()
     if not left_out:
         inputs |= stored | {name: result for name, result in outdated.items() if result.complete}
@@ -322,18 +322,18 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     # Imported here: a file that cannot be written is refused before drawing code is loaded.
-    from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
+    from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
     rigid, contact = MODEL_NAMES
     shown, *behind = [contact, rigid] if film.model == BOTH else [film.model]
     with results_to_show(folder, [shown, *behind], console.warn) as results:
         walk, *others = (the_result(results, folder, model) for model in (shown, *behind))
         for model in (shown, *behind):
-            why = FILM_NEEDS[model].missing_in(results, {})
-            if why is not None:
-                raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
-        sticks = sticks_of(walk)
-        other = sticks_of(others[0]) if others else None
+            reason = FILM_NEEDS[model].missing_in(results, {})
+            if reason is not None:
+                raise StaleError(f"the walk cannot be drawn: {reason}.", STORED_WITH)
+        sticks = read_sticks(walk)
+        other = read_sticks(others[0]) if others else None
         times = film_times(sticks, film.steps, film.rate, film.slower)
         line = console.begin("animate", f"{times.size} pictures")
         line.start("drawing", int(times.size))

@@ -101,7 +101,7 @@ def export(
         typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
     ] = None,
     dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = EXPORT_DPI,
-    model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
+    model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Model of the trajectory; {FIRST_WALK}.")] = None,
     law: Annotated[
         str | None,
         typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
@@ -186,7 +186,7 @@ def animate(
     output: Output = None,
     model: Annotated[
         str | None,
-        typer.Option(metavar="STAGE|both", help=f"Whose walk; both shows both models in one picture; {FIRST_WALK}."),
+        typer.Option(metavar="STAGE|both", help=f"Model of the walk; both: both models in one picture; {FIRST_WALK}."),
     ] = None,
     steps: Annotated[
         int | None,

@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperCommand
 
 from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
-from walkerlab.extensions import check_names, foreign
+from walkerlab.extensions import check_names, external_extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.console import Console
@@ -134,7 +134,7 @@ class Request:
         """Return the options, each preceded by a space, with which a command works on this run.
 
         This command repeats its own options; other stages get only those that they read, as settings, and all other
-        commands get every one. Settings by --set go to every command.
+        commands get all of them. Every command gets the settings by --set.
         """
         from walkerlab.config.reads import keys_of
 
@@ -377,7 +377,7 @@ class SuggestingCommand(TyperCommand):
 
 
 class Offer(NamedTuple):
-    """A function of a request, and of further options, that the program offers as a command."""
+    """A function that the program offers as a command. Its arguments are a request and further options."""
 
     function: Callable[..., None]
     shared: Sequence[str] = ()  # fields of the request that the command offers as options
@@ -392,7 +392,7 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # Flags such as --from cannot be names of parameters.
-    names = {f"set_{place}": option for place, option in enumerate(sets)}
+    names = {f"set_{index}": option for index, option in enumerate(sets)}
 
     def run(**arguments: Any) -> None:
         values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
@@ -400,7 +400,7 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
         instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
         request = asks(typed, settings, instead, graph, **{field: arguments.pop(field) for field in shared})
         with exit_on_failure(request):
-            if foreign() and typed != "extensions":
+            if external_extensions() and typed != "extensions":
                 commands = [str(each.name) for each in app.registered_commands]
                 check_names(request.console.warn, (each for each in commands if commands.count(each) > 1))
             function(request, **arguments)

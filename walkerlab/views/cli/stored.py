@@ -138,8 +138,8 @@ def print_stored(request: Request, stage: str) -> None:
     if not request.folder.path.is_dir():
         raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
     if not isinstance(step.found, Stored):
-        why = "it does not exist yet" if step.reason == NOT_THERE else step.reason
-        raise StaleError(f"{path} cannot be shown: {why}.", f"`walkerlab {stage}` computes it.")
+        reason = "it does not exist yet" if step.reason == NOT_THERE else step.reason
+        raise StaleError(f"{path} cannot be shown: {reason}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":
         request.console.warn(f"{path} is out of date: {step.reason}")
     about = {"stage": stage, "artifact": str(path), "current": step.action == "reuse", "why": step.reason}
@@ -271,10 +271,10 @@ def rerun_artifact(path: Path, request: Request) -> None:
     if before == after:
         print_result(request, value, [f"{path} is reproduced bit for bit: content {before[:DIGEST_CHARACTERS]}."])
         return
-    why = "the code is the same" if same_code else "the code has changed since"
+    reason = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
         f"{path} is not reproduced: its content digest was {before[:DIGEST_CHARACTERS]} "
-        f"and is now {(after or 'missing')[:DIGEST_CHARACTERS]}; {why}.",
+        f"and is now {(after or 'missing')[:DIGEST_CHARACTERS]}; {reason}.",
         "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
     print_result(request, value, [], another)

@@ -50,7 +50,9 @@ class SweepRequest(Request):
         "--chunk-seconds", metavar="S", help="Target duration of a chunk; default: depends on the engine."
     )
     show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
-    against: str | None = option("--against", metavar="NAME", help="Quantity to plot it over; default: the parameters.")
+    against: str | None = option(
+        "--against", metavar="NAME", help="Quantity on the horizontal axis; default: the swept parameters."
+    )
     as_csv: bool = option(
         "--csv",
         default=False,

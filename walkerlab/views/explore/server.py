@@ -120,8 +120,8 @@ class Job:
         if status != 0:
             raise RuntimeError(next((line for line in lines if line.startswith("error:")), "\n".join(lines[-2:])))
         with contextlib.suppress(json.JSONDecodeError):
-            found: dict[str, Any] = json.loads(printed)
-            return found
+            answer: dict[str, Any] = json.loads(printed)
+            return answer
         return {}
 
 
@@ -143,14 +143,14 @@ def start_name(base: ExploredConfig) -> str:
 
 def choices(base: ExploredConfig) -> list[str]:
     """List the other configs to choose from: built-in ones, and the YAML files in the working folder."""
-    own = sorted(path.name for path in Path().glob("*.yaml"))
-    return [name for name in (*builtin_names(), *own) if name != start_name(base)]
+    files = sorted(path.name for path in Path().glob("*.yaml"))
+    return [name for name in (*builtin_names(), *files) if name != start_name(base)]
 
 
 def render_page(base: ExploredConfig) -> tuple[str, str]:
     """Return the page's HTML and its content security policy."""
-    own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
-    script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
+    explore_script = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
+    script = f'\n"use strict";\n{report.source("player.js")}\n{explore_script}\n'
     environment = report.environment()
     environment.loader = FileSystemLoader([report.TEMPLATE_FOLDER, TEMPLATES])
     html = environment.get_template("explore.html.j2").render(
@@ -220,7 +220,9 @@ class Desk:
                     answer = self.worker.do(call)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    deaths += error.exit_code_of_worker != -GIVE_WAY  # the signal kills a worker without a handler yet
+                    deaths += (
+                        error.exit_code_of_worker != -GIVE_WAY
+                    )  # the signal kills workers that have no handler yet
                     if deaths > 1:
                         return failure(500, error.message, error.advice)
                 except Exception as error:
@@ -378,8 +380,8 @@ class Handler(BaseHTTPRequestHandler):
 
     def check_origin(self) -> bool:
         """Check that this server's page sent the request, and answer with status 403 if not. Return whether it did."""
-        own = f"http://{self.server.host}"
-        if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
+        origin = f"http://{self.server.host}"
+        if self.headers.get("Host") == self.server.host and self.headers.get("Origin", origin) == origin:
             return True
         self.answer(*failure(403, "only this server's own page may send requests"))
         return False

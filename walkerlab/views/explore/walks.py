@@ -32,7 +32,7 @@ FIRST: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
-"""Keys shown before any search, in this order; a trailing dot means the whole block."""
+"""Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
 """Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
 HIDDEN_KEYS: Final = (
@@ -78,7 +78,7 @@ def rank(key: str, first: Any) -> int | None:
     """Return a key's position among those shown initially, or None if it appears in searches only."""
     if (key.startswith(DRIVES) and not first) or key.startswith("walker.knee."):
         return None
-    places = (place for place, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
+    places = (index for index, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
     return next(places, None)
 
 
@@ -104,7 +104,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
         least, most = sorted((first / by, first * by))
         logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
-        # a value close to zero must be able to reach the typical size
+        # A slider that starts close to zero must reach the typical size.
         most = max(most, ordinary) if logarithmic else most
     if unit != "deg":
         least = max(least, low)
@@ -133,7 +133,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
     }.get(unit, 0.0)  # fmt: skip
 
 
-@lru_cache(maxsize=1000)  # asked again for every key whenever a slider is released
+@lru_cache(maxsize=1000)  # called again for every key whenever a slider is released
 def gaits_by(key: str, start: Config) -> Parameter | None:
     """Return the key as a parameter along which gaits can be followed, or None if no model depends on it."""
     try:
@@ -226,7 +226,7 @@ class ExploredConfig:
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
-def sets_of(config: Config) -> tuple[str, ...]:
+def set_arguments(config: Config) -> tuple[str, ...]:
     """Return the `--set` texts that turn the built-in paper config into `config`."""
     paper = ExploredConfig(None, (), Path(), {}).loaded.config.model_dump(mode="json")
     values = config.model_dump(mode="json").items()
@@ -244,28 +244,32 @@ def walk(question: ExploredConfig) -> Answered:
     try:
         loaded = question.loaded
         config = loaded.config
-        wanted = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
+        stages = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # Compute the walks first: they store the gait, so that it need not be found again.
-        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")}
+        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*stages, "fixedpoint")}
     except ConfigError as error:
         return question.refusal(error)
-    commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *wanted)]
-    found: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
+    commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *stages)]
+    answer: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
     walks: dict[str, Content] = {}
-    for stage in ("fixedpoint", *wanted):
-        said = answers[stage].no_answer
-        found[stage] = answers[stage].findings
-        if said is not None:
-            found[stage]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
+    for stage in ("fixedpoint", *stages):
+        no_answer = answers[stage].no_answer
+        answer[stage] = answers[stage].findings
+        if no_answer is not None:
+            answer[stage]["error"] = {
+                "message": no_answer.message,
+                "advice": no_answer.advice,
+                "exit_code": no_answer.exit_code,
+            }
             if stage == "fixedpoint":
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage]
     if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
-        found["scene"] = player.scene
+        answer["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
-        found["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
-    return 200, found
+        answer["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
+    return 200, answer
 
 
 def numbers(question: ExploredConfig) -> Answered:
@@ -279,7 +283,8 @@ def numbers(question: ExploredConfig) -> Answered:
 def follow_gaits(question: ExploredConfig) -> Answered:
     """Follow gaits over one key: values, quantities and stability along each model's branches.
 
-    The request's changes contain the block `continuation`: key, ends and points. Status 409 if a newer request came.
+    The request's changes contain the block `continuation`: key, ends and points. The status is 409 if a newer request
+    has arrived.
     """
     try:
         config = question.loaded.config
@@ -305,11 +310,11 @@ def curve(branch: Group) -> dict[str, list[Any]]:
     period = branch["step_period"][:, 0]
     length = branch["step_length"][:, 0]
     multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
-    found = {
+    quantities = {
         "value": branch["value"], "stable": branch["stable"], "period_s": period, "step_length_m": length,
         "speed_m_s": length / period, "spectral_radius": multipliers,
     }  # fmt: skip
-    return {name: values.tolist() for name, values in found.items()}
+    return {name: values.tolist() for name, values in quantities.items()}
 
 
 def config_text(question: ExploredConfig, name: str) -> str:
@@ -323,5 +328,5 @@ def config_text(question: ExploredConfig, name: str) -> str:
     named = replace(question, changes={**question.changes, "name": name})
     base = load(Path(start)).config
     changed = named.loaded.config
-    alike = base.walker.type == changed.walker.type
-    return to_extending_yaml(start, base, changed, name) if alike else to_yaml(changed)
+    same_type = base.walker.type == changed.walker.type
+    return to_extending_yaml(start, base, changed, name) if same_type else to_yaml(changed)

@@ -31,7 +31,7 @@ HEIGHT_EXPONENT = 0.7
 """Height of a figure is proportional to its width raised to this power. It is below 1 because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Largest ratio of an axis's limits, and the multiples of powers of ten that are labelled up to it."""
+"""Multiples of powers of ten that are labelled on an axis, after the largest ratio of its limits that they suit."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_MINOR_SPAN: Final = 1e4
 """Largest number written without an exponent."""

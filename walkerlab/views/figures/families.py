@@ -158,15 +158,16 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
 
 
 def clouds(results: Results) -> Iterator[tuple[str, Group]]:
-    found = ((model, results[CONTINUATION_STAGE].groups.get(f"{model}/attractor")) for model in MODEL_COLOURS)
-    return ((model, group) for model, group in found if group is not None)
+    attractors = ((model, results[CONTINUATION_STAGE].groups.get(f"{model}/attractor")) for model in MODEL_COLOURS)
+    return ((model, group) for model, group in attractors if group is not None)
 
 
 ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
-"""Minimum span of panel (b) as a fraction of the full range, and of a vertical axis as a fraction of its magnitude."""
+"""Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
+"""
 TOLD_APART: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
 CLOSER: Final = 0.8
@@ -180,7 +181,7 @@ def draw_branches(results: Results) -> Drawn:
     summary = results[CONTINUATION_STAGE].summary
     branches = list(branches_of(results))
     settled = list(clouds(results))
-    close = close_of(results)
+    close = closer_view(results)
     parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
     if is_narrow():
         figure, stack = panels(5.6 * len(parts), 2 * len(parts))
@@ -242,15 +243,15 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
         above.set_xlabel("steps per gait born in a fold")
 
 
-def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor, or None if it is no closer view."""
+def closer_view(results: Results) -> tuple[float, float] | None:
+    """Return the parameter range around the bifurcations and any attractor, or None if that is no closer view."""
     summary = results[CONTINUATION_STAGE].summary
-    found = [item["value"] for item in summary["bifurcations"]]
-    if not found:
+    values = [item["value"] for item in summary["bifurcations"]]
+    if not values:
         return None
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
-    least = min(found)
-    most = max(*ends, max(found))
+    least = min(values)
+    most = max(*ends, max(values))
     room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     close = max(least - room, summary["from"]), min(most + room, summary["to"])
     return close if close[1] - close[0] < CLOSER * (summary["to"] - summary["from"]) else None
@@ -262,10 +263,10 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)
         value, quantity = (interpolate(values) for values in (curve.value, curve.quantity))
-        wanted = np.append(np.repeat(curve.stable, POINTS_BETWEEN), curve.stable[-1:])
+        is_stable = np.append(np.repeat(curve.stable, POINTS_BETWEEN), curve.stable[-1:])
         if close is not None:
-            wanted &= (value >= close[0]) & (value <= close[1])
-        shown.append(quantity[wanted | (close is None and branch.period == 1)].ravel())
+            is_stable &= (value >= close[0]) & (value <= close[1])
+        shown.append(quantity[is_stable | (close is None and branch.period == 1)].ravel())
     values = np.concatenate(shown)
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
@@ -290,8 +291,8 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     """Return densely sampled multipliers along a branch (points, multipliers), largest first."""
     # The coefficients of their polynomial are interpolated, because the multipliers have kinks where two of them meet.
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
-    found = np.array([np.roots(row) for row in interpolate(np.array([np.poly(row).real for row in known]))])
-    return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
+    roots = np.array([np.roots(row) for row in interpolate(np.array([np.poly(row).real for row in known]))])
+    return np.take_along_axis(roots, np.argsort(-np.abs(roots), axis=1), axis=1)
 
 
 GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMILLION, GREY)}

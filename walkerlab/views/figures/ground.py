@@ -88,8 +88,8 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
     # The last sample before each touchdown is taken, so that an impact counts entirely towards the step that it starts.
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
-    given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
-    total = np.diff((given - walk[TOTAL])[rows])
+    supplied = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
+    total = np.diff((supplied - walk[TOTAL])[rows])
     by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
     return {
         cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NEGLIGIBLE_LOSS * np.abs(total).max()
@@ -98,17 +98,17 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 def draw_losses(results: Results) -> Drawn:
     """Plot a stacked bar per step. The caption gives the mean loss (J) by cause, leaving out the first step."""
-    found = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
+    by_cause = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
     figure, axes = panels(2.9)
-    steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(found.values())).size))
+    steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(by_cause.values())).size))
     below = np.zeros(steps.size)
-    for (_, colour), lost in found.items():
+    for (_, colour), lost in by_cause.items():
         axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
         below += lost[: steps.size]
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set(xlabel="step", ylabel="energy lost (J)")
-    add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in found])
-    later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in found.items()}
+    add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in by_cause])
+    later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in by_cause.items()}
     return figure, (later, sum(later.values()))
 
 

@@ -171,11 +171,11 @@ def draw_errors(results: Results) -> Drawn:
     first_start = rows[0]["start"]
     entries = rows[0]["errors"]
     figure, axes = panels(0.9 + PANEL_INCHES * len(entries), len(entries), sharex=True, squeeze=False)
-    for place, (panel, parameter) in enumerate(zip(axes[:, 0], entries, strict=True)):
+    for index, (panel, parameter) in enumerate(zip(axes[:, 0], entries, strict=True)):
         for row, errors in zip(rows, group["standard_error"], strict=True):
             style = "-" if row["start"] == first_start else "--"
             colour = MEASUREMENT_COLOURS[names.index(row["measurement"])]
-            panel.loglog(group["steps"], errors[:, place], style, color=colour, marker=".", markersize=3.0)
+            panel.loglog(group["steps"], errors[:, index], style, color=colour, marker=".", markersize=3.0)
         if "wanted" in parameter:
             panel.axhline(parameter["wanted"], color="black", linewidth=0.7, linestyle=":")
         panel.set_ylabel(label_of(f"± {axis_label(parameter['key'])}", parameter["unit"]))

@@ -1,4 +1,4 @@
-"""The type of an illustration: its name, texts, required results and drawing function."""
+"""Illustrations: their names, texts, required results and drawing functions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -32,17 +32,17 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the requirement is not met, or None if it is. `absent` holds the reason for each missing result,
-        by stage.
+        """Return the reason why the requirement is not met, or None if it is met. `absent` holds the reason for each
+        missing result, by stage.
         """
         if self.stage not in results:
-            why = absent.get(self.stage)
-            return f"it needs {self.stage}" + (f": {why}" if why else "")
+            reason = absent.get(self.stage)
+            return f"it needs {self.stage}" + (f": {reason}" if reason else "")
         result = results[self.stage]
         group = result.groups.get(self.group)
-        there = group is not None and all(name in group.variables for name in self.variables)
-        there = there and (not self.scene or self.scene in result.summary["reference"])
-        return None if there else f"{self.stage}: {self.or_else}"
+        is_complete = group is not None and all(name in group.variables for name in self.variables)
+        is_complete = is_complete and (not self.scene or self.scene in result.summary["reference"])
+        return None if is_complete else f"{self.stage}: {self.or_else}"
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Illustration:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why it cannot be drawn, or None if it can. `absent` holds the reason for each missing result, by
-        stage.
+        """Return the reason why the illustration cannot be drawn, or None if it can. `absent` holds the reason for each
+        missing result, by stage.
         """
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)

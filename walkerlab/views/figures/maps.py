@@ -1,4 +1,6 @@
-"""Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and the reliability of methods."""
+"""Maps of cells: figure 11 (starts that lead to walking), figure 15 (basins of attraction), and the reliability of
+methods.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -53,11 +55,11 @@ def edges(centres: NDArray[Any]) -> NDArray[Any]:
     """Return cell edges halfway between neighbouring values (geometric mean if the values are spaced geometrically)."""
     scale = np.log(centres) if is_logarithmic(centres) else centres
     if scale.size == 1:
-        found = np.array([scale[0] - 0.5, scale[0] + 0.5])
+        scaled = np.array([scale[0] - 0.5, scale[0] + 0.5])
     else:
         middle = 0.5 * (scale[1:] + scale[:-1])
-        found = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
-    return np.exp(found) if is_logarithmic(centres) else found
+        scaled = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
+    return np.exp(scaled) if is_logarithmic(centres) else scaled
 
 
 def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
@@ -181,9 +183,9 @@ def kinds_of_cells(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapp
         (ATTRACTOR_COLOURS[number % len(ATTRACTOR_COLOURS)], attractor_name(number, attractors), attractor == number)
         for number in range(len(attractors))
     ]
-    said = "aperiodic" if summary["aperiodic"] else "walks, not settled"
+    unsettled_label = "aperiodic" if summary["aperiodic"] else "walks, not settled"
     unsettled = (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)
-    kinds.append((OUTCOME_TEXTS[Outcome.WALKED].colour, said, unsettled))
+    kinds.append((OUTCOME_TEXTS[Outcome.WALKED].colour, unsettled_label, unsettled))
     failures = [item for item in Outcome if item is not Outcome.WALKED]
     kinds += [(OUTCOME_TEXTS[item].colour, item.label, outcome == item) for item in failures]
     return [kind for kind in kinds if kind[2].any()]
@@ -248,38 +250,38 @@ class OverStiffness:
 def draw_stiction(results: Results) -> Drawn:
     """Plot outcomes (left) and errors (right) over stiffness and stiction velocity."""
     cells = results[MAPS]["stiction"]
-    made = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
+    maps = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
     outcomes = cells["outcome"]
     compared = cells["compared"] == 1
-    made.draw(made.left, outcomes, **OUTCOME_COLOURS)
+    maps.draw(maps.left, outcomes, **OUTCOME_COLOURS)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)
-    made.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
+    maps.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
     seen = [*ends_among(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
-    for axes in (made.left, made.right):
+    for axes in (maps.left, maps.right):
         axes.plot(*PAPER, **mark, markersize=5.0)
-    add_legend(made.figure, [*patches(seen), entry("paper", linestyle="none", **mark)])
-    return made.figure, (results[MAPS].summary, cells.attrs)
+    add_legend(maps.figure, [*patches(seen), entry("paper", linestyle="none", **mark)])
+    return maps.figure, (results[MAPS].summary, cells.attrs)
 
 
 def draw_step(results: Results) -> Drawn:
     """Plot verdicts (left) and errors (right) over stiffness and step size."""
     cells = results[MAPS]["step"]
     names = [item.partition(" ")[2] for item in str(cells.attrs["verdicts"]).split(", ")]
-    made = OverStiffness(cells, STEP_SIZE, ("(a) outcome", "(b) error of the final state"))
+    maps = OverStiffness(cells, STEP_SIZE, ("(a) outcome", "(b) error of the final state"))
     verdict = np.array(names, dtype=object)[cells["verdict"]]
-    made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
+    maps.draw(maps.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
     errors = ("fine", "wrong silently")
     others = [(VERDICT_COLOURS[name], name, verdict == name) for name in VERDICT_COLOURS if name not in errors]
-    made.draw_errors(np.isin(verdict, errors), ROUGH, others)
+    maps.draw_errors(np.isin(verdict, errors), ROUGH, others)
     line: dict[str, Any] = {"color": GREY, "linewidth": 0.8}
-    for axes in (made.left, made.right):
+    for axes in (maps.left, maps.right):
         axes.axvline(PAPER[0], **line)
     seen = [names[int(number)] for number in np.unique(cells["verdict"])]
     shown = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
-    add_legend(made.figure, [*shown, entry("the paper's stiffness", **line)])
-    return made.figure, (results[MAPS].summary, cells.attrs)
+    add_legend(maps.figure, [*shown, entry("the paper's stiffness", **line)])
+    return maps.figure, (results[MAPS].summary, cells.attrs)
 
 
 NOT_COMPUTED = "this map was not computed"

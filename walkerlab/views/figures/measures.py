@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from walkerlab.config.walkers import AssembledWalker, CompassWalker, Kneed, StraightLegs, second_of
+from walkerlab.config.walkers import AssembledWalker, CompassWalker, Kneed, StraightLegs, second_leg_of
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.style import BLACK, BLUE, FIGURE_WIDTH, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION
 
@@ -23,7 +23,7 @@ FIGURE_HEIGHT = 4.6
 SMALL = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
+"""Dimensions up to this length (leg lengths) have a label but no arrow, and soles no mark at their centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
@@ -32,9 +32,9 @@ SECOND_LEG_ANGLE = -0.3
 BENT_ANGLE = -0.75
 """Angle (rad) at which the shank of the second leg is drawn."""
 LEFT_OF_LEG = 0.62
-"""Distance (leg lengths) of the labels behind the leg from it."""
+"""Distance (leg lengths) between the leg and the labels behind it."""
 FIRST_LANE = 0.24
-"""Distance (leg lengths) of the first dimension line ahead of the leg from it."""
+"""Distance (leg lengths) between the leg and the first dimension line ahead of it."""
 LETTER = 0.0088
 """Width of a character as a fraction of the picture's width."""
 LINE_SPACING = 0.0195
@@ -150,16 +150,16 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw an upright leg with its dimensions, and the other leg faintly behind it. Legs that differ have a panel
     each, the first leg above.
     """
-    legs = [measure_leg(each) for each in dict.fromkeys((walker, second_of(walker)))]
+    legs = [measure_leg(each) for each in dict.fromkeys((walker, second_leg_of(walker)))]
     views = [frame_leg(leg) for leg in legs]
     heights = [FIGURE_WIDTH * (view.top - view.bottom) / view.width for view in views]
     titles = len(legs) > 1
     figure = blank(sum(heights) + titles * len(legs) * TITLE)
     panels = figure.subplots(len(legs), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for place, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
-        draw_panel(axes, leg, legs[-1 - place], view)
+    for index, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
+        draw_panel(axes, leg, legs[-1 - index], view)
         if titles:
-            axes.set_title(f"leg {place + 1}", fontsize=SMALL)
+            axes.set_title(f"leg {index + 1}", fontsize=SMALL)
     return figure
 
 
@@ -168,7 +168,7 @@ class View:
     """Part of the plane (m) around a leg that shows all its labels, and where they are."""
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
-    heights: list[float]  # of these labels
+    heights: list[float]  # height of each of these labels
     lanes: list[list[Length]]  # vertical dimensions ahead of the leg, by lane
     ahead: list[int]  # number of characters that fit in each lane
     left: float
@@ -257,11 +257,11 @@ def clear(dimension: Length, second: Length, length: float) -> bool:
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
     """Return label heights as close to the wanted ones as possible, raised where the labels below need room."""
-    found = list(heights)
-    for place in sorted(range(len(found)), key=found.__getitem__):
-        found[place] = max(found[place], lowest + 0.5 * sizes[place])
-        lowest = found[place] + 0.5 * sizes[place]
-    return found
+    spread_heights = list(heights)
+    for place in sorted(range(len(spread_heights)), key=spread_heights.__getitem__):
+        spread_heights[place] = max(spread_heights[place], lowest + 0.5 * sizes[place])
+        lowest = spread_heights[place] + 0.5 * sizes[place]
+    return spread_heights
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:

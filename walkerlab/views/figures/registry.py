@@ -1,4 +1,4 @@
-"""All illustrations in display order: those with a number of the paper, then others, including those of extensions."""
+"""All illustrations in display order: first those numbered as in the paper, then the others, with extensions last."""
 
 from walkerlab.extensions import extensions, load
 from walkerlab.views.figures import families, ground, identification, maps, robustness, stick_diagram, walks

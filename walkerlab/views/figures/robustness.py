@@ -14,7 +14,7 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, sticks_of
+from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, read_sticks
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
@@ -69,7 +69,7 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
 def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
     """Plot figure 17. The caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
     x = group[parameter].astype(float)
-    said = axis_label(parameter)
+    axis_text = axis_label(parameter)
     unit = group.variables[parameter].units
     models = [str(group[f"gaits.{k}.model"][0]) for k in range(2) if f"gaits.{k}.model" in group.variables]
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
@@ -81,11 +81,11 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
                     panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
         panel.set_ylabel(label)
     axes[2].axhline(0.0, color=GREY, linewidth=0.7)
-    axes[-1].set_xlabel(label_of(said, unit))
+    axes[-1].set_xlabel(label_of(axis_text, unit))
     add_legend(figure, [entry(f"{model} model", color=MODEL_COLOURS[model], **LINES[model]) for model in models])
     norms = {model: rows_of(group, PANELS[0][1], model)[0] for model in models}
     best = {model: (x[np.nanargmin(norm)], np.nanmin(norm)) for model, norm in norms.items() if np.isfinite(norm).any()}
-    return figure, (said, unit, best)
+    return figure, (axis_text, unit, best)
 
 
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
@@ -113,13 +113,13 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
-    for panel, (said, name, logarithmic) in zip(axes, ACTUATION_PANELS, strict=True):
+    for panel, (label, name, logarithmic) in zip(axes, ACTUATION_PANELS, strict=True):
         for parameter, points in driven.items():
             order = np.argsort(speed[points])
             at = speed[points][order]
             values = group[name].astype(float)[points][order]
             panel.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
-        panel.set_ylabel(said)
+        panel.set_ylabel(label)
         if logarithmic:
             error_axis(panel)
     axes[-1].set_xlabel("speed (m/s)")
@@ -132,7 +132,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 def plot_rough_ground(results: Results) -> Drawn:
     """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[ROBUSTNESS_STAGE]
-    sticks = sticks_of(result, "rough_walk/")
+    sticks = read_sticks(result, "rough_walk/")
     steps = result["rough_steps"]
     across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
@@ -164,7 +164,7 @@ def plot_rough_ground(results: Results) -> Drawn:
 
 
 def draw_shares(axes: Axes, steps: Group) -> None:
-    """Plot the fraction of walks still going over the number of steps, for each model and roughness."""
+    """Plot the fraction of walks still upright after each number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
             # A walk that was cut off has not failed, so it counts as still walking.

@@ -37,8 +37,8 @@ def run(
     progress.start("plot", reasons.count(None))
     drawn = []
     missing = []
-    for figure, why in zip(FIGURES, reasons, strict=True):
-        if why is None:
+    for figure, reason in zip(FIGURES, reasons, strict=True):
+        if reason is None:
             drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))
             progress.advance()
         else:
@@ -47,7 +47,7 @@ def run(
                     (folder / path).unlink(missing_ok=True)
             # Figures of stages that run only on request are not reported as missing, because nobody asked for them.
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
-                missing.append({"what": figure.called, "why": why})
+                missing.append({"what": figure.called, "why": reason})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # Some captions quote run times, which differ from run to run, so the texts count as timings.
     summary = {"figures": drawn, "left_out": missing}

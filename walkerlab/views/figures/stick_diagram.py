@@ -139,28 +139,28 @@ class Sticks:
         return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
-def sticks_of(result: Identified, under: str = "") -> Sticks:
+def read_sticks(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
-    asked = result.identity.config_slice
+    config = result.identity.config_slice
     trajectory = result[f"{under}trajectory"]
-    walker = asked["walker"]
+    walker = config["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
 
-    slope = float(asked["slope_rad"])
+    slope = float(config["slope_rad"])
     hip = joints("hip")
     head = None
     if "torso_angle" in trajectory.variables:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
-    radii = radii_of(walker)
+    radii = sole_radii(walker)
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radii = 0.0, 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
     levels = ground_levels(steps)
-    pushes = asked["push_off"]["impulse_N_s"] != 0.0
+    pushes = config["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
     ending = outcome.label if outcome is not None and outcome.stumbled else ""
     landings = np.append(0.0, steps["touch_along_m"])
@@ -176,14 +176,14 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
     )  # fmt: skip
 
 
-def radii_of(walker: Mapping[str, Any]) -> tuple[float, float]:
+def sole_radii(walker: Mapping[str, Any]) -> tuple[float, float]:
     """Return the radius (m) of each foot of a stored walker."""
     if "feet" in walker:
         first, second = (float(foot["radius_m"]) for foot in walker["feet"])
         return first, second
-    own = float(walker["foot_radius_m"])
+    radius = float(walker["foot_radius_m"])
     other = (walker.get("leg_2") or {}).get("foot_radius_m")
-    return own, own if other is None else float(other)
+    return radius, radius if other is None else float(other)
 
 
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
@@ -306,7 +306,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 def draw_cycle(stage: str, results: Results) -> Drawn:
     """Draw one gait cycle of a stage's walk on its pads or plane (figures 2 and 6)."""
     result = results[stage]
-    sticks = sticks_of(result)
+    sticks = read_sticks(result)
     pads = result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
     add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
@@ -421,8 +421,8 @@ def pictures(
                 line.set_data(*places[index].T)
             hip.set_data(*lines[0][index, :1].T)
             leg = sticks.pushing(float(time))
-            own = lines[leg or 0][index]
-            mark = np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1])))
+            leg_line = lines[leg or 0][index]
+            mark = np.stack((leg_line[-1], leg_line[-1] + PUSH_SHARE * (leg_line[0] - leg_line[-1])))
             push.set_data(*(([], []) if leg is None else mark.T))
             over = sticks.ending and time >= sticks.time[-1]
             clock.set_text(f"{time:.2f} s: {sticks.ending}" if over else f"{time:.2f} s")

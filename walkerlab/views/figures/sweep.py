@@ -185,8 +185,8 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     unit = group.variables[few].units
     key = []
     for value, look in zip(values, looks, strict=True):
-        said = f"{value:.6g}" if isinstance(value, float) else str(value)
-        key.append(entry(f"{axis_label(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        key.append(entry(f"{axis_label(few)} {text}{f' {unit}' if unit not in ('', '1') else ''}", **look))
     add_legend(figure, [*key, *legend_entries(group, names)])
     return figure
 

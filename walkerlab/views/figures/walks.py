@@ -84,8 +84,10 @@ class DrawnWalk:
 def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
     """Return the walks whose trajectories have the given variables, the rigid model's walk first."""
     every = ((RIGID_STAGE, RIGID_LOOK), (CONTACT_STAGE, CONTACT_LOOK), (RECORDED_STAGE, RECORDED))
-    there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
-    return [walk_of(results[stage], look) for stage, look in there]
+    available = [
+        (stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})
+    ]
+    return [walk_of(results[stage], look) for stage, look in available]
 
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
@@ -231,7 +233,7 @@ def draw_cycles(results: Results) -> Drawn:
 
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
-    """Plot the last stride in the model's style, with earlier strides as thin lines below."""
+    """Plot the last stride in the model's style, with earlier strides as thin lines behind it."""
     # markers show the state just before a heel strike: filled if this leg strikes, open if the other does
     angle = walk["angle"][:, leg]
     velocity = walk["velocity"][:, leg]
@@ -240,8 +242,8 @@ def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
     line(axes, angle[last], velocity[last], look)
     before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
-    own = walk["stance_leg"][before] != leg + 1
-    for rows, face in ((before[own], look.colour), (before[~own], "white")):
+    strikes_itself = walk["stance_leg"][before] != leg + 1
+    for rows, face in ((before[strikes_itself], look.colour), (before[~strikes_itself], "white")):
         axes.plot(
             angle[rows], velocity[rows], linestyle="none", marker=look.marker, markersize=4.5,
             markerfacecolor=face, markeredgecolor=look.colour, zorder=look.order + 2,
@@ -293,8 +295,8 @@ def draw_energies(results: Results) -> Drawn:
         integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
         means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
     impacts = any(walk.look is CONTACT_LOOK for walk in walks)
-    asked = results[RIGID_STAGE].identity.config_slice
-    driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
+    config = results[RIGID_STAGE].identity.config_slice
+    driven = any((config["push_off"]["impulse_N_s"], *config["walker"]["hip"].values()))
     return figure, (extent, means, bool(claims_in(results)), impacts, driven, walks)
 
 

@@ -39,7 +39,7 @@ FIRST_VALUES = 4
 LAST_VALUES = 6
 """Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
-"""Maximum number of steps of a cycle whose periods a sentence lists."""
+"""A sentence lists the periods of a cycle only if it has at most this many steps."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
@@ -67,7 +67,7 @@ def answer_html(stage: str, summary: Summary) -> str:
 
 
 def further_tables(stage: str, summary: Summary) -> list[str]:
-    """Return lines that complete an answer, as `--verbose` shows them, or none if the answer is complete."""
+    """Return the lines that `--verbose` adds to an answer, or none if the answer is complete."""
     if stage != "robustness" or not summary:
         return []
     from walkerlab.views.report.sections import robustness
@@ -152,7 +152,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
     advised = summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
-        " ".join(settling(summary)),
+        " ".join(settling_sentences(summary)),
         side_by_side("", columns, step_rows, head="step"),
         side_by_side("", WALK_ROWS, {"": summary}, head=""),
         f"numerical error: {describe_error(error)}." if error else "",
@@ -176,20 +176,20 @@ def each_step(summary: Summary) -> dict[str, Summary]:
     }
 
 
-def settling(summary: Summary) -> Iterator[str]:
+def settling_sentences(summary: Summary) -> Iterator[str]:
     """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
     from walkerlab.views.report.sections.walks import format_step
 
     steps = summary["steps"]
     period = summary.get("repeats_after") or 0
-    left = summary.get("leaves_gait_at")
-    if left:
-        yield f"It begins on an unstable gait and leaves it: step {left} is the first that differs by more than 1 %."
+    first = summary.get("leaves_gait_at")
+    if first:
+        yield f"It begins on an unstable gait and leaves it: step {first} is the first that differs by more than 1 %."
     if 1 < period <= MAX_CYCLE:
-        cycle = join_words(format_step(place, "step_periods_s", summary) for place in range(steps - period, steps))
+        cycle = join_words(format_step(index, "step_periods_s", summary) for index in range(steps - period, steps))
         repeats = "alternates between steps" if period == 2 else f"repeats every {period} steps,"
         yield f"In the end it {repeats} of {cycle} s."
-    elif left and summary["outcome"] == WALKED_LABEL:
+    elif first and summary["outcome"] == WALKED_LABEL:
         yield (
             "In the end all its steps are equal." if period == 1 else "Its last steps do not repeat; a longer walk may."
         )
@@ -208,9 +208,9 @@ def tune(summary: Summary) -> list[str | Table]:
 
     gait = summary["gait"]
     missing = "" if gait["found"] else f"No own gait: {gait['reason']}."
-    own = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
+    gait_table = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
     sentences = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
-    return [*sentences, own, adjustment.margins_table(summary)]
+    return [*sentences, gait_table, adjustment.margins_table(summary)]
 
 
 LAST_STEP = (

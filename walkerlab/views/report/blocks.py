@@ -147,7 +147,7 @@ class Player:
     walkers: tuple[Walker, ...]
     slope_rad: float
     leg_m: float
-    foot_radii_m: tuple[float, float]  # of both legs
+    foot_radii_m: tuple[float, float]  # radius of each leg's foot
     closeup_m: float  # height of the close-up of a foot
     view: tuple[int, int, int, int]  # left, top, width and height of the stills (mm, y down), after the slope is tilted
     torso_m: float = 0.0
@@ -233,7 +233,7 @@ class Results:
     stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
     pictures: tuple[Picture, ...] = ()  # embedded figures of `plot`
     absent: tuple[LeftOut, ...] = ()  # missing results, with reasons
-    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
+    pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
     failed: frozenset[str] = frozenset()  # stages that were run and failed
 
     @property
@@ -263,8 +263,8 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Pass a stage's summary to the decorated function. There is no section if the summary is empty or lacks the key
-    `needed`.
+    """Make a decorator that passes the summary of a stage to a function. There is no section if the summary is empty
+    or lacks the key `needed`.
     """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:

@@ -1,4 +1,4 @@
-"""Figures and page as stages, after all others."""
+"""The stages that draw the figures and the page, after all others."""
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension

@@ -77,10 +77,10 @@ def step_value(place: int, key: str, gait: Mapping[str, Any]) -> float:
 
 def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
     """Yield lines with the period and length of both steps of a gait, and their asymmetries."""
-    for place, leg in enumerate(("leg 1", "leg 2")):
+    for index, leg in enumerate(("leg 1", "leg 2")):
         for name, key in (("period", "period_s"), ("length", "length_m")):
             title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
-            yield Column(title, partial(step_value, place, key), written, numeric=True)
+            yield Column(title, partial(step_value, index, key), written, numeric=True)
     for name in ("step_period", "step_length"):
         words = f"asymmetry of the {name.replace('_', ' ')} (second minus first, over the mean)"
         yield Column(words, f"asymmetry/{name}", lambda share: f"{fixed(100.0 * share, 2)} %")
@@ -171,13 +171,13 @@ def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[
         Column("gait", "gait", numeric=True),
         measured("T", "period_s", five),
         measured("S", "step_length_m", five),
-        *(Column(symbol(name), partial(state_at, place), four, numeric=True) for place, name in enumerate(names)),
+        *(Column(symbol(name), partial(state_at, index), four, numeric=True) for index, name in enumerate(names)),
         Column("spectral radius", "spectral_radius", four, numeric=True),
         Column("stable", "stable"),
         Column("remark", lambda gait: "chosen" if gait["chosen"] else gait["objection"]),
     )
     alone = list(sets) == ["corrected"]
-    numbered = {name: [{**gait, "gait": place} for place, gait in enumerate(found, 1)] for name, found in sets.items()}
+    numbered = {name: [{**gait, "gait": index} for index, gait in enumerate(found, 1)] for name, found in sets.items()}
     gaits = {"" if alone else SETS[name]: found for name, found in numbered.items()}
     differ = any(legs_differ(gait) for found in sets.values() for gait in found)
     return table(f"All {'gaits of one stride' if differ else 'one-step gaits'} found", columns, gaits)

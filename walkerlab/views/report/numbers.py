@@ -10,11 +10,11 @@ SUPERSCRIPTS = str.maketrans("0123456789+-en", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺�
 DOT = "\u0307"
 
 POWER = re.compile(r"(?<![\w.])(?<!\w-)(\d+(?:\.\d+)?)e([-+]?)0*(\d+)\b")
-"""A number in exponent notation such as 1.1e-09, but not the end of a name such as k-1e8."""
+"""Pattern of numbers in exponent notation, such as 1.1e-09, except at the end of a name such as k-1e8."""
 
 
 CARET = re.compile(r"(?<=\d)\^(-?\d+)\b")
-"""A typed power, such as 10^-4."""
+"""Pattern of powers as users type them, such as 10^-4."""
 
 
 def to_superscript(match: re.Match[str]) -> str:
@@ -46,7 +46,7 @@ RULES = (
 
 
 def typeset(text: str) -> str:
-    """Convert plain letters to signs: 'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'."""
+    """Replace spelled-out symbols by signs: 'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'."""
     for pattern, sign in RULES:
         text = pattern.sub(sign, text)
     return text

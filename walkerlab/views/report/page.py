@@ -142,8 +142,8 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
     attributes = Markup("")
     for key, value in element.attrib.items():
         local = "href" if key in (f"{XLINK}href", "href") else key
-        wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
-        if wanted and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
+        is_copied = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
+        if is_copied and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
             attributes += Markup(' {}="{}"').format(Markup(local), shorten_attribute(local, value))
     return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
@@ -154,7 +154,7 @@ def text_content(text: str | None, name: str) -> Markup:
 
 
 def shorten_attribute(name: str, value: str) -> str:
-    """Shorten an attribute: coordinates to a hundredth of a point, colours to CSS variables."""
+    """Shorten the value of an attribute: round coordinates to 0.01 pt, and replace colours by CSS variables."""
     if name in ("id", "href", "clip-path"):
         return value.strip()
     if name == "style":
@@ -171,7 +171,7 @@ def role(match: re.Match[str]) -> str:
 TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 COMMENT_LINE = re.compile(r"^ *//.*\n", re.MULTILINE)
 CODE_SPAN = re.compile(r"`([^`]*)`")
-"""Code in a text, between backticks."""
+"""Pattern of code in a text, between backticks."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Page:
     file: str = MAIN
     study: Source | None = None  # the study reproduced, or None
     relation: str = "Redoes"  # first word of the line about the study: Redoes, or After if the scene differs
-    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
+    pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
     run: str = ""  # name of the run for suggested commands; empty for the default run
 
 
@@ -198,12 +198,12 @@ def render(page: Page) -> str:
         raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     # Markup only for the package's own files; all other texts are escaped.
-    own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
-    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **own)
+    trusted = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
+    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **trusted)
 
 
 def digest_of(script: str) -> str:
-    """Return the hash by which the page's content security policy recognises its own script."""
+    """Return the hash by which the page's content security policy recognises the script of the page."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 

@@ -28,7 +28,7 @@ from walkerlab.views.report.sections import (
 from walkerlab.views.report.words import words
 
 
-def added(slot: str) -> tuple[SectionMaker, ...]:
+def added_sections(slot: str) -> tuple[SectionMaker, ...]:
     """Return the sections that extensions add at a place of the page."""
     makers = (maker for extension in extensions().values() for maker in extension.sections.get(slot, ()))
     return tuple(map(load, makers))
@@ -37,9 +37,9 @@ def added(slot: str) -> tuple[SectionMaker, ...]:
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,
     motion.section,
-    *added("task"),
+    *added_sections("task"),
     motion.figures,
-    *added("walks"),
+    *added_sections("walks"),
     gaits.section,
     families.section,
     walks.assumptions,
@@ -51,9 +51,9 @@ SECTIONS: tuple[SectionMaker, ...] = (
     identification.section,
     identification.plan_section,
     verdict.models_section,
-    *added("evidence"),
+    *added_sections("evidence"),
     accuracy.section,
-    *added("benchmarks"),
+    *added_sections("benchmarks"),
     adjustment.limit,
     closing.glossary,
     closing.omissions_section,

@@ -55,7 +55,7 @@ def write_pages(
 
     Raises StorageError if that fails.
     """
-    # also called while other stages are running, and when the command is stopped
+    # This is also called while other stages are running, and when the command is stopped.
     pending = tuple(entry for entry in left_out if entry.why in (STILL_COMPUTED, STOPPED))
     absent = tuple(entry for entry in left_out if entry not in pending)
     names = {entry.what for entry in absent}
@@ -72,7 +72,7 @@ def write_pages(
 
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
-    """Whether a stage ran and failed itself, rather than lacking another stage's result."""
+    """Whether a stage itself ran and failed, instead of only lacking the result of another stage."""
     if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
         return False
     return left_out.isdisjoint(PIPELINE[name].inputs(config))

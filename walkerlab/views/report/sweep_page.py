@@ -1,4 +1,4 @@
-"""Plots a sweep and writes its page."""
+"""Plot a sweep, and write its page."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -38,15 +38,15 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     if against and against not in question.names:
         check_quantities(group, [against], "--against")
     quantities = [*names] or [name for name in choose(group, question.names) if name != against]
-    own = None if names or against else robustness.sweep_illustration(group, question.names)
-    if own is None and quantities:
-        own = illustration(group, question.stage, question.names, quantities, against)
+    special = None if names or against else robustness.sweep_illustration(group, question.names)
+    if special is None and quantities:
+        special = illustration(group, question.stage, question.names, quantities, against)
     page = folder.path / PAGE
     paths = []
     pictures = []
-    if own is not None:
+    if special is not None:
         make_folder(folder.figures)
-        pictures = [picture(draw_figure(own, {}, folder.path, swept.path.stem), folder.path)]
+        pictures = [picture(draw_figure(special, {}, folder.path, swept.path.stem), folder.path)]
         paths = [folder.path / path for path in paths_of(swept.path.stem).values()]
     write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
     return page, paths
@@ -61,7 +61,7 @@ def check_quantities(group: Group, names: Sequence[str], option: str = "--show")
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity in `names` (by option). Nested ones may appear later."""
+    """Raise ConfigError for an unknown quantity in `names` (by option). Quantities in blocks may still appear later."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

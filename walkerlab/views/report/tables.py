@@ -17,7 +17,7 @@ PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
 """Number of characters of a cell above which its column is treated as text."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
-"""A number without unit or words."""
+"""Pattern of numbers without unit or words."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def table(
         if isinstance(record, list | tuple) and len(record) != len(columns):
             raise ValueError(f"expected {len(columns)} cells: {record!r}")
     rows = {
-        title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in members]
+        title: [[column.cell(record, index) for index, column in enumerate(columns)] for record in members]
         for title, members in groups.items()
     }
     return Table(caption, tuple(columns), rows, wordy, note, by)
@@ -157,7 +157,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
         [Cell("" if (value := row.get(name)) is None else written(value), value=value) for name in names]
         for row in rows
     ]
-    lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
+    lengths = [max(len(row[index].text) for row in cells) for index in range(len(names))]
     room = any(length <= LONGEST_CELL for length in lengths)
     columns = [Column(name, wide=room and length > LONGEST_CELL) for name, length in zip(names, lengths, strict=True)]
     return table("", columns, cells)

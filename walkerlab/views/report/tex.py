@@ -17,7 +17,7 @@ EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, graphicx, siunitx}"
 WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
 SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
-"""Begin of a box that is at most as wide as the text around it."""
+"""Start of a box that is at most as wide as the text around it."""
 MIN_HEAD: Final = 10
 """Number of characters of a column's head that always stay on one line."""
 MAX_UNWRAPPED: Final = 28
@@ -29,11 +29,11 @@ CHARACTER_PT: Final = 5.0
 COLUMN_WIDTHS: Final = {1: 252.0, 2: 516.0}
 """Width (pt) of one and of two columns of a journal."""
 TITLE: Final = re.compile(r"(?P<words>.*\S)\s+(?P<unit>\([^()]*\))")
-"""Title of a column with a unit."""
+"""Pattern of column titles with a unit."""
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
-"""A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
+"""Pattern of numbers in siunitx columns: sign, digits before and after the point, sign and digits of the exponent."""
 ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in escaped text."""
+"""Pattern of powers in escaped text."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
 r"""A spelled-out symbol with a subscript in escaped text, such as dtheta\_1."""
 IN_MATHS = {
@@ -46,7 +46,7 @@ IN_MATHS = {
 }
 SCRIPT = re.compile(r"[\^_]\{([^{}]*)\}")
 SCRIPTS = re.compile(r"([\^_])\{[^{}]*\}(?:\1\{[^{}]*\})+")
-"""Several superscripts, or subscripts, in a row, which LaTeX refuses."""
+"""Pattern of several superscripts or subscripts in a row, which LaTeX rejects."""
 SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
 """Characters that LaTeX can set only in maths."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
@@ -58,7 +58,7 @@ def as_tex(content: Table, columns: int = 1) -> bytes:
     columns  journal columns that the table spans; its type is as small as they require
     """
     titles, rows = flatten(content)
-    data = [[row[place].datum for row in rows] for place in range(len(titles))]
+    data = [[row[index].datum for row in rows] for index in range(len(titles))]
     layouts, cells = zip(*map(format_column, data), strict=True)
     heads = head_rows(titles, layouts, cells)
     head, body = ([" & ".join(line) + r" \\" for line in zip(*block, strict=True)] for block in (heads, cells))
@@ -81,7 +81,7 @@ def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
 
 
 def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return the lines of each column's head: words over one another, and units in a row of their own."""
+    """Return the lines of each column's head: one word above the other, and the unit in a row of its own."""
     parts = [TITLE.fullmatch(title) for title in titles]
     has_units = any(part and part["unit"] for part in parts)
     heads = []
@@ -103,7 +103,7 @@ def format_column(data: Sequence[Any]) -> tuple[str, list[str]]:
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else escape_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
-    # text that looks like numbers, such as printed values, makes the column numeric if it is most of the column
+    # Text that looks like numbers, such as printed values, counts as numbers if most of the column looks like it.
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
         longest, longest_word = (max(map(len, texts), default=0) for texts in (cells, " ".join(cells).split()))
         return WRAPPED if longest_word <= MAX_UNWRAPPED < longest else "l", cells
@@ -135,7 +135,7 @@ def format_digits(value: float) -> str:
 def room_for(cells: Sequence[str]) -> str:
     """Return siunitx's table-format: digits before and after the decimal point, and of the exponent."""
     parts = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
-    sign, before, behind, below, power = (max(len(groups[place]) for groups in parts) for place in range(5))
+    sign, before, behind, below, power = (max(len(groups[index]) for groups in parts) for index in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
 
 

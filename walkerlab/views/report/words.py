@@ -68,12 +68,12 @@ def describe_error(error: Mapping[str, Any]) -> str:
 
 
 def legs_differ(gait: Mapping[str, Any]) -> bool:
-    """Whether a gait's steps are those of legs that differ, so that a single step has no multipliers."""
+    """Whether a gait is that of a walker with different legs, so that only its strides have multipliers."""
     return "gait_steps" in gait and "multipliers" not in gait
 
 
 def describe_limp(gait: Mapping[str, Any]) -> str:
-    """Describe, after a multiplier, by how much the steps of legs that differ differ, or return '' for equal legs."""
+    """Describe, after a multiplier, the difference between the steps of both legs, or return '' for equal legs."""
     if not legs_differ(gait):
         return ""
     period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))
@@ -84,7 +84,7 @@ def describe_limp(gait: Mapping[str, Any]) -> str:
 
 
 def compare(asymmetry: float, more: str, less: str) -> str:
-    """Compare a second value with the first, from their difference over their mean: '5.3 % more'."""
+    """Describe a second value relative to the first, as '5.3 % more', from their difference divided by their mean."""
     percent = 100.0 * ((2.0 + asymmetry) / (2.0 - asymmetry) - 1.0)
     return f"{number(abs(percent), 2)} % {more if percent > 0.0 else less}"
 

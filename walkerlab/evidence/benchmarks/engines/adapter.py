@@ -20,7 +20,9 @@ class Integrator:
     order: int  # nominal order of convergence
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
-    for_contact_only: bool = False  # whether it matters only on the engine's own contact, and equals another without
+    for_contact_only: bool = (
+        False  # run it only with the engine's contact; without contact it equals another integrator
+    )
 
 
 @dataclass(frozen=True)

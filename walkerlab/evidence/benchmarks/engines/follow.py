@@ -162,7 +162,7 @@ class RuleFollower:
             else:
                 self._end(contact_transitions.touch(form, walk_state, feet_at_event, foot, time_at_event, y))
         completed = walk_state.progress.steps == walk_state.touch_time.size
-        if completed and not contact_state.is_to_lift(walk_state):
+        if completed and not contact_state.has_not_lifted(walk_state):
             self._end(Outcome.WALKED)
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
@@ -192,7 +192,9 @@ class RuleFollower:
     @property
     def is_outdated(self) -> bool:
         """Whether a touch has released a knee that the engine's model still has locked."""
-        return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
+        # a leg without a knee counts as locked
+        knees = self.walk_state.knee[: len(self.scene.assembly.knees)]
+        return int(np.count_nonzero(knees == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Lock or release the knee in `turn`, and return coordinates and velocities of the model with the new locks."""

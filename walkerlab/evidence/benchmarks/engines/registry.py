@@ -19,9 +19,9 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in output, of the adapter module and of the distribution to install
+    name: str  # name in the output, also that of the adapter module and of the distribution to install
     module: str  # import name of its package
-    core: str = ""  # distribution of the library itself, where it can be installed alone
+    core: str = ""  # distribution of the library itself, if it can be installed alone
 
     @property
     def is_installed(self) -> bool:

@@ -2,7 +2,7 @@
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.engine_scene import EngineScene, engine_scene, refuse_one_knee
+from walkerlab.exchange.engine_scene import EngineScene, engine_scene
 from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT
@@ -19,7 +19,6 @@ def supported_scene(
 
     Raises ConfigError for a walker that other engines do not support.
     """
-    refuse_one_knee(config)
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(

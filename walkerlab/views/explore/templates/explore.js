@@ -50,7 +50,7 @@ function remember() {
   remember.last = fragment();
 }
 
-// Requests are sent one at a time; of those made while one is answered, only the last is sent.
+// Requests are sent one at a time. While one is being answered, only the newest of the others is kept.
 
 let busy = false;
 let pending = false;
@@ -294,7 +294,7 @@ function arrange(numbers) {
     const old = before.get(number.key);
     const same = old && old.number.start === number.start && "from" in old.number === "from" in number;
     const row = same ? Object.assign(old, { number }) : new Row(number);
-    // A row chosen in the search stays, and so does a changed one without a slider of its own.
+    // Rows chosen in the search stay visible, and so do changed rows that are otherwise found only by the search.
     row.pinned = pinned.has(number.key) || (number.rank === null && number.key in state.set);
     if (!row.edited) row.put(state.set[number.key] ?? number.value);
     rows.set(number.key, row);
@@ -356,7 +356,7 @@ class Along extends Plot {
   look(event) {
     if (this.series) this.tip.textContent = `${digits(this.value(this.at(event)), 4)} ${rows.get(this.key)?.number.unit ?? ""}`;
   }
-  // Coarse first, then finer unless something else is requested.
+  // Draw coarse curves first, then finer ones unless something else is requested.
   async draw() {
     const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one?.number.gaits);
     if (!row) return;
@@ -447,7 +447,7 @@ function download(name, address) {
   Object.assign(document.createElement("a"), { download: name, href: address }).click();
 }
 
-// The canvas is transparent: fill in the page's background.
+// The canvas is transparent, so fill in the background of the page.
 function savePicture() {
   if (!player) return;
   const { canvas } = player.walk;

@@ -28,7 +28,10 @@ def section(results: Results, summary: Summary) -> Section | None:
     return Section.create("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
-ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit", wide=True))
+ORDER_COLUMNS = (
+    Column("parameter"),
+    Column("observed orders of convergence, the last one nearest the limit", wide=True),
+)
 
 
 def limit(results: Results) -> Section | None:
@@ -118,7 +121,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
 
 MARGIN_COLUMNS = (
     Column("scaled velocity", "name", typeset),
-    Column("last factor at which the start walks", "factor", number, numeric=True),
+    Column("largest change that still leads to walking (factor)", "factor", number, numeric=True),
     Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
     Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
 )

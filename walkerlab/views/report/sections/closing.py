@@ -93,14 +93,16 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield for each reason a row of results missing because of it, then a row of any results that depend on them."""
+    """Yield, for each reason, a row with the results missing for it and, if any, one with those that need them."""
     reasons = {absent.why for absent in missing}
     # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
-    for why in dict.fromkeys(causes.values()):
-        alike = [absent for absent in missing if absent.why == why]
-        first = join_words(absent.what for absent in alike)
-        yield first, why, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
-        dependents = join_words(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
+    for reason in dict.fromkeys(causes.values()):
+        same_reason = [absent for absent in missing if absent.why == reason]
+        first = join_words(absent.what for absent in same_reason)
+        yield first, reason, "; ".join(dict.fromkeys(absent.saves for absent in same_reason if absent.saves))
+        dependents = join_words(
+            absent.what for absent in missing if absent.why != reason and causes[absent.why] == reason
+        )
         if dependents:
             yield dependents, f"needs {first}", ""

@@ -73,7 +73,7 @@ class DiagramAxis:
         return round(self.start + (value - self.least) / (self.most - self.least) * (self.end - self.start), 1)
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Return position and text of the ticks, at round values."""
+        """Return the positions and texts of ticks at round values."""
         rough = (self.most - self.least) / 5.0
         ten = 10.0 ** math.floor(math.log10(rough))
         step = ten * next(digit for digit in (5, 2, 1) if digit * ten <= rough)

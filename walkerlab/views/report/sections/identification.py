@@ -14,7 +14,7 @@ from walkerlab.views.report.words import words
 NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
-NOTABLE_CHANGE = 0.5  # of an estimate, in standard errors, if a fixed parameter is 1 % larger
+NOTABLE_CHANGE = 0.5  # change of an estimate (standard errors) that is reported, if a fixed parameter is 1 % larger
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
@@ -23,6 +23,9 @@ GAIT_WORDS = {
     "spectral_radius": "a largest multiplier of {}",
     "drop_sensitivity_s_m": "a sensitivity norm (period for a drop of the floor) of {}",
 }
+BOTH_LEGS = "the legs weigh {} kg each"
+ONE_LEG = "leg 1 weighs {} kg"
+DIFFERENCES = {"mass of leg 2": ("heavier", "lighter"), "length of leg 2": ("longer", "shorter")}
 ESTIMATE_COLUMNS = (
     Column("parameter", "key"),
     Column("estimate", lambda row: rounded(row["value"], row["standard_error"]), numeric=True),
@@ -56,9 +59,10 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     verdict = verdict_of(summary)
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
-    references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
-    masses = [estimate_in_words(row) for row in known if row["key"].endswith("mass_kg")]
-    others = [estimate_in_words(row) for row in known if not row["key"].endswith("mass_kg")]
+    leg = ONE_LEG if summary.get("first_leg") else BOTH_LEGS
+    references = [describe_mass(key, number(value), leg) for key, value in summary["reference_masses_kg"].items()]
+    masses = [describe_estimate(row, leg) for row in known if row["key"].endswith("mass_kg")]
+    others = [describe_estimate(row) for row in known if not row["key"].endswith("mass_kg")]
     condition = f" if {join_words(references)}" if references else ""
     determined = capitalised("; ".join([*([join_words(masses) + condition] if masses else []), *others]))
     keys = [row["key"] for row in summary["estimates"]]
@@ -74,15 +78,16 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
-    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
-    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
+    beside = (contradicted_priors(summary["prior"]), describe_nuisances(summary["nuisance"]), is_usable(verdict))
+    quality = (other, describe_gait(summary["gait"]), describe_noise(summary), is_usable(verdict))
     measured = summary.get("measured_spectral_radius")
     held = next(iter(sensitive_rows(summary, known)), None)
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
+        *(describe_limp_of_legs(summary) if is_usable(verdict) else []),
         *words.parts("identify.quality", summary, verdict, *quality),
-        *([radius_in_words(measured)] if measured and is_usable(verdict) else []),
-        *([change_in_words(held, known)] if held and is_usable(verdict) else []),
+        *([describe_radius(measured)] if measured and is_usable(verdict) else []),
+        *([describe_change(held, known)] if held and is_usable(verdict) else []),
     ]
 
 
@@ -119,7 +124,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return the fixed parameters, the most influential first, with the change of each estimate if one is 1 % larger.
 
-    A parameter is left out if this changes all estimates by less than half a standard error.
+    A parameter is left out if its change moves all estimates by less than half a standard error.
     """
     rows = dict[str, dict[str, Any]]()
     errors = {row["key"]: row["standard_error"] for row in estimates}
@@ -152,21 +157,46 @@ def value_and_error(value: float, error: float | None, unit: str) -> str:
     return f"{fixed(value, decimals_of(error))} ± {fixed(error, decimals_of(error))}{ending}"
 
 
-def mass_in_words(key: str, text: str) -> str:
-    """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'."""
-    body = axis_label(key).removesuffix(" mass")
-    return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
+def describe_mass(key: str, text: str, leg: str = BOTH_LEGS) -> str:
+    """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'. `leg` is the phrase for the mass of leg 1."""
+    label = axis_label(key)
+    if label == "leg mass":
+        return leg.format(text)
+    body = "leg 2" if label == "mass of leg 2" else f"the {label.replace(' mass', '')}"
+    return f"{body} weighs {text} kg"
 
 
-def estimate_in_words(row: Mapping[str, Any]) -> str:
+def describe_limp_of_legs(summary: Mapping[str, Any]) -> list[str]:
+    """Return sentences about the legs' differences, if any is clear, and about the leg that swings first."""
+    rows, others = summary.get("leg_differences", []), summary.get("other_leg_differences", [])
+    if not any(abs(row["value"]) > CONTRADICTION * row["standard_error"] for row in rows):
+        return []
+    limp, first = join_words(map(describe_difference, rows)), summary["first_leg"]
+    if first["by"] == "guess":
+        or_else = f"{limp} if leg {first['leg']} swings first, otherwise {join_words(map(describe_difference, others))}"
+        return [f"The legs differ: {or_else}. The data do not say which leg swings first: --first-leg 1 or 2 would."]
+    tried = " Both legs were tried as the first to swing: it is leg {leg}, as the walk shows.".format(**first)
+    return [f"The legs differ: {limp}.{tried if first['by'] == 'likelihood' else ''}"]
+
+
+def describe_difference(row: Mapping[str, Any]) -> str:
+    """Describe how leg 2 differs, as in 'leg 2 is 0.31 ± 0.02 kg heavier'."""
+    label = axis_label(row["key"])
+    more, less = DIFFERENCES.get(label, ("larger", "smaller"))
+    subject = "leg 2" if label in DIFFERENCES else f"the {label}"
+    by = value_and_error(abs(row["value"]), row["standard_error"], row["unit"])
+    return f"{subject} is {by} {more if row['value'] > 0.0 else less}"
+
+
+def describe_estimate(row: Mapping[str, Any], leg: str = BOTH_LEGS) -> str:
     value = value_and_error(row["value"], row["standard_error"], row["unit"])
     bound = " (at its bound)" if row["at_bound"] else ""
     if row["key"].endswith("mass_kg"):
-        return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
+        return describe_mass(row["key"], value.removesuffix(" kg"), leg) + bound
     return f"the {axis_label(row['key'])} is {value}{bound}"
 
 
-def change_in_words(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
+def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
     """Describe how estimates change if the most influential fixed parameter is off."""
     change = quantity(held["change"], unit_by_name(held["to"]), 2)
     units = [UNITS_IN_WORDS.get(row["unit"], f" {row['unit']}") for row in estimates]
@@ -182,7 +212,7 @@ def label_combination(combination: str, keys: Sequence[str]) -> str:
     return combination
 
 
-def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
+def contradicted_priors(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
     """Return label and value of each prior that the walk contradicts, and the distance in standard errors."""
     return [
         (axis_label(row["key"]), value_and_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
@@ -191,7 +221,7 @@ def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str,
     ]
 
 
-def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
+def describe_nuisances(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
             f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
@@ -201,16 +231,16 @@ def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     )
 
 
-def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
+def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
     parts = [
-        said.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
-        for name, said in GAIT_WORDS.items()
+        phrase.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
+        for name, phrase in GAIT_WORDS.items()
         if name in gait
     ]
     return f"The identified gait has {join_words(parts)}" if parts else ""
 
 
-def radius_in_words(radius: Mapping[str, float]) -> str:
+def describe_radius(radius: Mapping[str, float]) -> str:
     value = value_and_error(radius["value"], radius["standard_error"], "1")
     plain = fixed(radius["plain"], decimals_of(radius["standard_error"]))
     return (
@@ -218,7 +248,7 @@ def radius_in_words(radius: Mapping[str, float]) -> str:
     )
 
 
-def noise_in_words(summary: Mapping[str, Any]) -> str:
+def describe_noise(summary: Mapping[str, Any]) -> str:
     """Describe the disturbances of the walk and the noise of the measurement."""
     process = summary["noise"]["process"]
     floor, share = (number(value, 2) for value in (1e3 * process["roughness_m"], 100.0 * process["share_of_leg"]))
@@ -251,7 +281,7 @@ def goals(summary: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each target error, with the fewest steps that reach it."""
     rows = summary["measurements"]
     return [
-        goal(rows, place, summary["max_steps"]) for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
+        goal(rows, index, summary["max_steps"]) for index, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
     ]
 
 
@@ -271,10 +301,10 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
 def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
     entries = summary["measurements"][0]["errors"]
     columns = [Column("measurement", "measurement"), Column("start", "start")]
-    for place, entry in enumerate(entries):
-        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(place), numeric=True))
+    for index, entry in enumerate(entries):
+        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(index), numeric=True))
         if "wanted" in entry:
-            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(place), numeric=True))
+            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(index), numeric=True))
     return [table(f"Standard errors after {summary['steps']} steps", columns, summary["measurements"])]
 
 

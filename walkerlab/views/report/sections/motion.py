@@ -98,8 +98,8 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
 def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
     """Return postures to show together, at heel strikes and mid-step: lines from foot to hip to foot (mm, y down)."""
     times: Any = np.array([0.0, *strikes])
-    wanted = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
-    rows = np.clip(np.searchsorted(track["t"], wanted), 0, track["t"].size - 1)
+    instants = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
+    rows = np.clip(np.searchsorted(track["t"], instants), 0, track["t"].size - 1)
     joints = [("f", "0"), ("k", "0"), ("h", ""), ("k", "1"), ("f", "1")]
     lines = [
         (track[f"{joint}x{leg}"], track[f"{joint}y{leg}"])

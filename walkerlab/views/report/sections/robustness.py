@@ -82,7 +82,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 
 
 def is_worse(row: Mapping[str, Any]) -> bool:
-    """Whether a gait is less robust at the optimum than at the start: survives less, or is more sensitive."""
+    """Whether a gait is less robust at the optimum than at the start: it survives less, or is more sensitive."""
     change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
     return (change if row["quantity"].startswith("largest") else -change) < -WORSE
 
@@ -122,12 +122,14 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
     first = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES]
     top = built[:MAX_DERIVATIVES]
-    left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
+    unlisted = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
         table("Gait sensitivity norms", columns, norms, note=words("robustness.norms", legs_differ)),
         table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
         table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
-        table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", left)),
+        table(
+            "Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", unlisted)
+        ),
         table("Gravity, slope and ground", DERIVATIVE_COLUMNS, environment[:MAX_DERIVATIVES]),
         table("Parameters that are zero", DERIVATIVE_COLUMNS, zeros, note=words("robustness.zeros")),
     ]

@@ -89,7 +89,10 @@ def failures(results: Results) -> list[str]:
         for absent in failed
     ]
     errors = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
-    return [*sentences, *(f"{name}: {why['message'].rstrip('.')}." for name, why in errors.items() if why is not None)]
+    return [
+        *sentences,
+        *(f"{name}: {reason['message'].rstrip('.')}." for name, reason in errors.items() if reason is not None),
+    ]
 
 
 def outcome_statements(results: Results) -> Iterator[Statement]:

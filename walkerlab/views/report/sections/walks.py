@@ -37,7 +37,7 @@ def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
     get = summary.get
-    lost = summary.get("dissipated_J") or {}
+    losses = summary.get("dissipated_J") or {}
     work = get("work_per_step_J") or {}
     values: dict[str, str | Cell] = {
         "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
@@ -52,7 +52,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "Froude number": number(get("froude"), 4),
         "cost of transport": number(get("cost_of_transport"), 4),
         "energy balance error": joules(summary["energy_balance_residual_J"]),
-        **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
+        **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in losses.items()},
         "solver work": format_integer(get("rhs_evaluations")),
     }
     meanings = words.terms("walks.meanings", summary)
@@ -129,10 +129,10 @@ def steps(results: Results) -> Section | None:
     if not series:
         return None
     every = ((results.summary(stage), key, values) for (stage, key), values in series.items())
-    written = [[format_step(place, key, summary) for place in range(len(values))] for summary, key, values in every]
-    taken = [(place, *step) for place, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
-    hidden = len(taken) - HEAD_STEPS - TAIL_STEPS
-    rows = taken if hidden <= 0 else [*taken[:HEAD_STEPS], *taken[-TAIL_STEPS:]]
+    written = [[format_step(index, key, summary) for index in range(len(values))] for summary, key, values in every]
+    numbered = [(index, *step) for index, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
+    hidden = len(numbered) - HEAD_STEPS - TAIL_STEPS
+    rows = numbered if hidden <= 0 else [*numbered[:HEAD_STEPS], *numbered[-TAIL_STEPS:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[name], numeric=True) for name in series)]
     note = words("walks.steps", HEAD_STEPS, hidden)
     models = {stage: model.lower() for stage, model in MODEL_NAMES.items()}

@@ -95,7 +95,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
-  // The camera follows the walkers that still walk; it leaves one that has ended within half a second.
+  // The camera follows the walkers that still walk. Within half a second, it leaves one whose walk has ended.
   const shares = tracks.map((track) => clamp(1 - (track.time - track.end) / 0.5, 0, 1));
   const hip = tracks.reduce((sum, track, index) => sum + shares[index] * track.at("hx"), 0) / shares.reduce((sum, share) => sum + share, 0);
   const toPixels = picture.toPixels = (x, y) => [
@@ -312,7 +312,7 @@ const niceStep = (rough) => {
   return ten * ([5, 2, 1].find((step) => step * ten <= rough) ?? 1);
 };
 
-// A plot: the curves are drawn once, the cursor in a layer above them.
+// A plot, whose curves are drawn once and whose cursor moves in a layer above them.
 class Plot {
   static WIDTH = 340;
   static HEIGHT = 230;
@@ -451,7 +451,7 @@ function play(root, firstScene, firstTracks) {
     for (const track of tracks) track.seek(time);
     show();
   };
-  // Replace the walks; the clock keeps its step, and the fraction of it.
+  // Replace the walks. The clock stays at the same fraction of the same step.
   const change = (newScene, newTracks) => {
     const step = Math.max(0, strikes.findLastIndex((strike) => strike <= time));
     const share = (time - strikes[step]) / (strikes[step + 1] - strikes[step]) || 0;
