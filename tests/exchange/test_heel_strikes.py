@@ -438,3 +438,14 @@ def test_shank_angles_of_a_kneed_walker_are_reported(name, count):
     steps = divide_into_steps(walk, rigid_walker(config), "kneed.csv")
     assert sum("as a shank does" in doubt for doubt in steps.doubts) == count
     assert np.diff(steps.touch_time_s) == pytest.approx(np.full(5, steps.touch_time_s[0]), abs=2e-4)
+
+
+@pytest.mark.parametrize("fps", [25.0, 50.0, 240.0])
+def test_two_stated_errors_contain_95_percent_of_the_strikes(fps, tmp_path):
+    errors = []
+    for seed in range(12):
+        summary = read(tmp_path, *sampled(begin=0.2 + 0.03 * seed, fps=fps, noise=1e-3, seed=seed))
+        strikes = summary["first_heel_strike_s"] + np.array([0.0, *summary["touch_times_s"]])
+        errors += [*((strikes - PERIOD_S * np.round(strikes / PERIOD_S)) / summary["touch_errors_s"])]
+    assert np.mean(np.abs(errors) < 2.0) > 0.95 - 2.0 * math.sqrt(0.95 * 0.05 / len(errors))
+    assert np.max(np.abs(errors)) < 5.0

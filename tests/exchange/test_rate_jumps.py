@@ -10,7 +10,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.config.recording import Recorded
 from walkerlab.exchange.columns import as_walk
-from walkerlab.exchange.rate_jumps import MOST_FOUND, sums_at_jumps
+from walkerlab.exchange.rate_jumps import MOST_FOUND, squares_around, sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording
 from walkerlab.exchange.walk_in_steps import divide_into_steps
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
@@ -67,3 +67,19 @@ def test_heel_strikes_are_found_with_offset_angles():
     steps = divide_into_steps(walk, walker, "film.csv", touch_sum_rad=0.1)
     assert steps.touch_time_s.size >= 7
     assert np.diff(steps.touch_time_s) == pytest.approx(0.7036, abs=0.01)
+
+
+def test_squares_around_an_instant_are_those_of_a_direct_fit():
+    rng = np.random.default_rng(5)
+    time = np.sort(rng.uniform(-1.0, 1.0, 80))
+    angle = np.column_stack((np.sin(3.0 * time), np.abs(time))) + 1e-3 * rng.standard_normal((80, 2))
+    instants = np.array([-1.2, -0.97, -0.3, 0.0, 0.41, 0.96])
+    direct = []
+    for instant in instants:
+        columns = [np.ones(80)]
+        for side in (time < instant, time >= instant):
+            degree = min(5, 1 + int(side.sum()) // 3)
+            columns += [np.where(side, time - instant, 0.0) ** power for power in range(1, degree + 1)]
+        basis = np.column_stack(columns)
+        direct.append(np.sum((angle - basis @ np.linalg.lstsq(basis, angle)[0]) ** 2))
+    assert squares_around(time, angle, instants, 5, 3) == pytest.approx(direct, rel=1e-6)

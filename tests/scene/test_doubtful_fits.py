@@ -277,6 +277,15 @@ def test_wrong_hip_mass_is_named_with_its_likelihood_gain():
     assert abs(values(right)[HIP].value - 10.0) < 3.0 * values(right)[HIP].standard_error
 
 
+def test_wrong_leg_length_is_doubted_in_steps_that_hardly_show_it():
+    *_, model, start = walker()
+    measured = MeasuredWalk(*measure_steps(model, start, np.random.default_rng(0), steps=20))
+    wrong, right = (identify(measured, f"{LEG}={leg}", fit={"slope_deg": None, HIP: None}) for leg in (0.88, 1.0))
+    assert wrong.verdict.fit == "fits-but"
+    assert "would raise the log-likelihood" in " ".join(wrong.verdict.reasons)
+    assert right.verdict.fit == "fits"
+
+
 def test_rate_jumps_at_strikes_are_estimated_with_valid_errors():
     even, kicked = (identify(measured_angles(3, change), fit={"slope_deg": None, HIP: None}) for change in (0.0, 0.005))
     for result in (even, kicked):

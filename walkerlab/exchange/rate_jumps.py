@@ -28,7 +28,7 @@ DEGREE: Final = 3
 SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
-RIDGE: Final = 1e-14  # relative; samples at nearly equal times would make equations singular
+RIDGE: Final = 1e-15  # relative; samples at nearly equal times would make equations singular
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:

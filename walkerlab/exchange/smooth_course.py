@@ -282,26 +282,26 @@ class Course:
                 kept &= (self.rows < stretch.first) | (self.rows >= stretch.end)
         return replace(self, time=self.time[kept], angle=angle[kept], rows=self.rows[kept])
 
-    def strike(self, place: int) -> Strike:
+    def strike(self, index: int) -> Strike:
         """Return the steps around the heel strike in a span."""
-        begin, end = self.spans[place]
-        at = self.guess(place)
+        begin, end = self.spans[index]
+        at = self.guess(index)
         margin = MARGIN * self.step_s
         farthest = MAX_FIT_TIME * self.step_s
-        first = max(self.guess(place - 1) + margin, at - farthest) if place else float(self.time[0])
-        following = place + 1 < len(self.spans)
-        last = min(self.guess(place + 1) - margin, at + farthest) if following else float(self.time[-1])
+        first = max(self.guess(index - 1) + margin, at - farthest) if index else float(self.time[0])
+        following = index + 1 < len(self.spans)
+        last = min(self.guess(index + 1) - margin, at + farthest) if following else float(self.time[-1])
         return self.part(
             first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
         )
 
-    def guess(self, place: int) -> float:
+    def guess(self, index: int) -> float:
         """Return a first guess of the time at which rates jump within a span."""
-        if place not in self.guesses:
-            begin, end = self.spans[place]
+        if index not in self.guesses:
+            begin, end = self.spans[index]
             half = 0.5 * self.step_s
-            self.guesses[place] = self.part(begin - half, end + half, (begin, end)).rough_instant
-        return self.guesses[place]
+            self.guesses[index] = self.part(begin - half, end + half, (begin, end)).rough_instant
+        return self.guesses[index]
 
     def part(self, first_s: float, last_s: float, span_s: tuple[float, float]) -> Strike:
         first, end = int(np.searchsorted(self.time, first_s)), int(np.searchsorted(self.time, last_s, "right"))

@@ -182,8 +182,8 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
     """Return the samples around an instant (times from it, and angles), with more of the step if samples are sparse."""
-    place = int(np.searchsorted(time, near))
-    away = np.sort(np.abs(time[max(0, place - 2 * MIN_SAMPLES) : place + 2 * MIN_SAMPLES] - near))
+    row = int(np.searchsorted(time, near))
+    away = np.sort(np.abs(time[max(0, row - 2 * MIN_SAMPLES) : row + 2 * MIN_SAMPLES] - near))
     wanted = float(away[: 2 * MIN_SAMPLES][-1])
     rows = rows_within(time, near, max(WINDOW * period, min(wanted, MAX_FIT_TIME * period)))
     return time[rows] - near, angle[rows]

@@ -70,6 +70,11 @@ class Fixed(NamedTuple):
     unit: str
     slope: Floats  # (values,) derivative of the predicted values with respect to a change by the scale
 
+    @property
+    def measured(self) -> bool:
+        """Whether somebody measured or set it, so that it may be wrong."""
+        return self.value != 0.0 and self.name not in KNOWN
+
 
 LEGS: Final = (1, 2)
 Begin = Callable[[str, int], Callable[[], None]]
@@ -84,10 +89,13 @@ MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of 
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
-PROMISING_GAIN: Final = 1.0  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+PROMISING_GAIN: Final = 1.4  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+REFIT_ROUNDS: Final = 3  # rounds of a new fit with a freed parameter; its gain hardly changes after them
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
-RARE_GAIN: Final = 0.03  # a gain is surprising if it is more improbable than this under the right model
+RARE_GAIN: Final = 0.01  # a gain is surprising if it is more improbable than this under the right model
+KNOWN: Final = ("gravity_m_s2",)
+"""Parameters whose value is beyond doubt."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -315,7 +323,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     other_leg = [*fixed_parameters(subject, question, best, [second_leg])][:1] if second_leg else []
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        others = (other_leg, fixed)
+        others = (other_leg, fixed) if len(left_open) < len(keys) else ()
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
         reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
@@ -412,22 +420,23 @@ def suggest_parameter(
 ) -> Iterator[str]:
     """Yield a fixed parameter or nuisance that would raise the log-likelihood if it were estimated as well.
 
-    A short walk is fitted better by any additional parameter, so the gain must also be rare for that number of values.
+    A parameter that somebody measured is doubted once it explains the walk better. Any other one, such as gravity or a
+    spring that the walker is not said to have, must gain more than chance allows for as many values.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
     widened = [reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors)) for other in others]
-    gains = [evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened]
+    gains = np.array([evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened])
+    measured = np.array([other.measured for other in others])
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
-    for index in np.argsort(gains)[: -MAX_FREED - 1 : -1].tolist():
+    order = np.lexsort((-gains, ~measured)).tolist() if others else []
+    for index in [each for each in order if gains[each] >= PROMISING_GAIN][:MAX_FREED]:
         other = others[index]
-        if gains[index] < PROMISING_GAIN:
-            return
-        gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
-        # With a fitted noise, a gain of the log-likelihood is a monotonic function of an F statistic.
-        rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
-        if gain > DECISIVE_GAIN and rare and abs(change) > SMALLEST_CHANGE:
+        gain, part, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(part, 0.0) / values)) < RARE_GAIN
+        decisive = gain > DECISIVE_GAIN if other.measured else part > DECISIVE_GAIN and rare
+        if decisive and abs(change) > SMALLEST_CHANGE:
             before = NUISANCES.get(other.name, (other.value, 0.0))[0]
             option = "--nuisance" if other.name in NUISANCES else "--fit"
             after = add_unit(f"{before + change * other.scale:.4g}", other.unit)
@@ -440,32 +449,34 @@ def suggest_parameter(
 
 def gain_of_freeing(
     subject: ModelUnderTest, keys: Sequence[str], other: Fixed, rows: Reduced, fitted: Fitted
-) -> tuple[float, float]:
-    """Return how much the log-likelihood rises if one more parameter is estimated, and the change of this parameter.
+) -> tuple[float, float, float]:
+    """Return how much the log-likelihood rises if one more parameter is estimated, the part of this rise that is due
+    to its own change, and this change.
 
-    The change is in the parameter's scale. Both are those of a linearised step with new standard deviations or, if the
-    step is long, of a new fit.
+    The change is in the parameter's scale. All are those of a linearised step with new standard deviations or, if the
+    step is long and promising, of a new fit.
 
     rows  data of the walk, with the derivative for one more parameter
     """
     problem = fitted.problem
     count = len(keys)
     step = evaluate(rows, fitted.noise).move
+    free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
+    gain = float(free.likelihood - fitted.evaluation.likelihood)
     if np.abs([*step[:count], step[-1] if other.value else 0.0]).max() < LINEAR_MOVE:
-        free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
-        return float(free.likelihood - fitted.evaluation.likelihood), float(free.move[-1])
-    if other.name in NUISANCES or subject.model != RIGID:
-        return 0.0, 0.0
+        return gain, gain, float(free.move[-1])
+    if gain < PROMISING_GAIN or other.name in NUISANCES or subject.model != RIGID:
+        return 0.0, 0.0, 0.0
     start = np.insert(fitted.u, count, other.value / other.scale)
-    refitted = fit(free_parameter(subject, (*keys, other.name), problem), start)
-    if not isinstance(refitted, Fitted):
-        return 0.0, 0.0
+    refitted = fit(free_parameter(subject, (*keys, other.name), problem), start, rounds=REFIT_ROUNDS)
+    if refitted is None:
+        return 0.0, 0.0, 0.0
     change = float(refitted.u[count] - start[count])
     # A new fit may also end in better standard deviations. The parameter itself gains half its squared change, in
     # standard errors.
     variance = robust_covariance(refitted, np.eye(refitted.u.size))[count, count]
-    gain = refitted.evaluation.likelihood - fitted.evaluation.likelihood
-    return min(float(gain), 0.5 * change**2 / float(variance)), change
+    gain = float(refitted.evaluation.likelihood - fitted.evaluation.likelihood)
+    return gain, min(gain, 0.5 * change**2 / float(variance)), change
 
 
 def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:

@@ -146,10 +146,13 @@ class Fitted:
         return self.noise.measurement * (math.sqrt(SOFT_EFFICIENCY) if self.problem.loss == "soft_l1" else 1.0)
 
 
-def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None) -> Fitted | None:
+def fit(
+    problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None, rounds: int = MAX_ROUNDS
+) -> Fitted | None:
     """Fit the unknowns from a start (unknowns,), or return None if no walk near the start can be predicted.
 
-    Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
+    Each of at most `rounds` rounds fits the unknowns by least squares on whitened residuals, then the standard
+    deviations.
     """
     forecast = problem.forecast
     u = start.copy()
@@ -162,7 +165,7 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
     if data is None:
         return None
     robust = None
-    for done in range(MAX_ROUNDS):
+    for done in range(rounds):
         on_round()
         before = u
         u = least_squares_fit(problem, u, start, heights, data, noise)
