@@ -140,6 +140,7 @@ def open_extension(found: Found) -> Found:
         extension = load(found.code)
         if found.source:
             check(extension)
+    # Code of other packages can do anything when it is imported, even leave.
     except (Exception, SystemExit) as error:
         if not found.source:
             raise
@@ -252,6 +253,7 @@ def announced() -> Iterator[tuple[str, str, str]]:
         if stored.get(folder, [0])[0] != stamp:
             stored[folder], changed = [stamp, scan(folder)], True
         for distribution, version, name, code in stored[folder][1]:
+            # Of two installations of a distribution, Python imports the one whose folder comes first.
             if (distribution, name) not in seen:
                 seen.add((distribution, name))
                 yield name, code, f"{distribution} {version}"

@@ -98,6 +98,8 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
         return
     part = model.parts[name]
     (x, y), (vx, vy) = part.place, part.velocity
+    # REULER turns about z, then x, then z, so one angle is enough for a turn in the plane. VX and VY are the velocity
+    # of the centre of mass along the ground's axes.
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
@@ -121,6 +123,7 @@ def contact_arguments(contact: AdamsContact, ids: Mapping[str, int]) -> Iterator
     pads = [str(ids[pad]) for pad in contact.pads]
     yield "TYPE = SOLID_TO_SOLID"
     yield f"IGEOM = {ids[contact.foot]}"
+    # ADAMS keeps lines within about 80 columns.
     yield "JGEOM = " + "\n, ".join(", ".join(pads[k : k + 10]) for k in range(0, len(pads), 10))
     yield "IMPACT"
     yield from (f"{name.upper()} = {finite(value)}" for name, value in contact.normal.items())

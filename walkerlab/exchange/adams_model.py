@@ -370,6 +370,8 @@ def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
         raise ConfigError(
             f"The normal-force law {type(normal).__name__} cannot be exported.", "Set contact.normal_force=impact."
         )
+    # Stiffness is in N/mm^e, so its factor depends on the exponent. ADAMS View scales it like force per length,
+    # whatever the exponent is.
     in_mm = Impact(
         normal.stiffness / MM**normal.exponent,
         normal.exponent,
@@ -492,6 +494,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.torque_N_m:
         # Each factor changes its sign at its touchdown.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
+        # ADAMS rejects most line breaks within an expression, so a long one is divided into variables.
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
         for number, group in enumerate(groups):
             model.variables[f"leg_that_swings_{number + 1}"] = group
@@ -580,6 +583,7 @@ def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
     uppers = export.names[export.hip_link], export.names[0]
     for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):
         terms = FootTerms(export, foot)
+        # Components 2 and 3 of CONTACT are the forces along x and y.
         ground = ("3", "2") if law == "contact" else ("normal", "friction")
         normal, friction = (
             f"CONTACT({{contact_{foot + 1}}},0,{part_of},0)" if law == "contact" else f"VARVAL({{{leg}_{part_of}}})"

@@ -104,6 +104,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
     recording, notes = set_frame_times(recording, asked)
+    # A stated unit of time is that of the file's times, which the frame rate has replaced.
     if FRAME_TIME in recording.columns:
         units = {name: unit for name, unit in units.items() if name != TIME}
     named = find_named(recording, asked)
@@ -119,7 +120,9 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     for pairs in ends.values():
         columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
+    # Lines are left out here, because their markers are examined one by one (see `body_gaps`).
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
+    # A fault in a column that every walk needs, or that the user names, is an error. Other columns are only left out.
     needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
     time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
     rows = select_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
@@ -145,6 +148,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     used = {name: sources[name] for name in (TIME, *values, *lines)}
+    # Messages name samples by their numbers in the file, however many are left out from here on.
     values[SAMPLE] = np.asarray(1.0 + np.flatnonzero(rows))
     tilt, tilt_notes = camera_tilt(recording, asked, slope_rad)
     walk = RecordedWalk(
@@ -182,6 +186,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
     elif stated is not None and (typical := float(np.nanmedian(np.diff(stated)))) > 0.0:
+        # Where the file leaves out frames, its times are farther apart, so rounding still counts them.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
         if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
@@ -249,6 +254,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
     """Return the forward lean (rad) of the direction from which angles are measured, and notes about it."""
     tilt = asked.camera_tilt_deg
     if tilt is None and recording.levelled_by:
+        # In tables of angles the floor's angle is added to the values instead (see `floor_in_column`).
         return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
             f"{recording.levelled_by} levels the floor, so angles are taken from the floor's normal: state "
             "--camera-tilt 0 if its floor_angle was 0."
@@ -303,6 +309,7 @@ def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
     """Return the columns of the upper and lower end of a line for each coordinate, or nothing if it is not a line."""
+    # The name of a column may itself contain '>'.
     ends = None if source in recording.columns else LINE.fullmatch(source)
     return line_columns(recording, ends[1], ends[2]) if ends else []
 
@@ -404,6 +411,7 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
     columns = {column: normalise_name(column) for column in recording.columns}
     by_ending: dict[str, list[str]] = {}
     for column, name in columns.items():
+        # ADAMS puts names of objects before that of a quantity, separated by dots, and OpenSim by slashes.
         for start in (0, *(match.end() for match in re.finditer(r"[./]", name))):
             by_ending.setdefault(name[start:], []).append(column)
     sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
@@ -635,6 +643,7 @@ def scale_of_line(
     """Return the SI value of the unit of each column of a line's ends, or None if all have the same unknown unit."""
     columns = [column for pair in pairs for column in pair]
     stated = {stated_unit(recording, column, column, "length", units) for column in columns}
+    # The angle of a line does not depend on the unit of length, as long as both ends share it.
     if len(stated) == 1 and value_in_si(next(iter(stated)), "length") is None:
         return None
     return {column: unit_value(recording, column, column, "length", units) for column in columns}

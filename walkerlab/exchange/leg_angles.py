@@ -38,6 +38,7 @@ def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
+    # Full turns, reversed signs and swapped legs would look like samples off the course, so they are mended first.
     mended = drop_off_course(swap_back(keep_one_way(unwrap(walk, source))))
     upright = {name: mended.quantities[name] - walk.tilt_rad for name in ("angle 1", "angle 2")}
     return replace(mended, quantities={**mended.quantities, **upright})

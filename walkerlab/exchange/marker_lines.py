@@ -170,6 +170,7 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     motion = against[0] - (against[1] if two else 0.0)
     motion = (motion - np.mean(motion, axis=0)) * ~vertical
     for _ in range(PLANE_FITS):
+        # The small term keeps both directions horizontal, even if the legs hardly move.
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
         # a marker that jumps sideways would turn the plane
         off = np.abs(motion @ sideways - np.median(motion @ sideways))
@@ -267,6 +268,7 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         lasting = np.zeros(length.size, bool)
         while jumps:
             first = jumps.pop(0)
+            # Two jumps in opposite directions are a brief change of the length.
             if jumps and sudden[first] * sudden[jumps[0]] < 0.0:
                 brief[first + 1 : jumps.pop(0) + 1] = True
             else:
@@ -315,6 +317,7 @@ def refuse_running(lines: Mapping[str, Line], plane: WalkPlane, source: str) -> 
     hip = np.mean([top @ plane.up for top, _ in legs], axis=0)
     if np.count_nonzero(np.diff(np.sign(spread - np.mean(spread)))) < FEWEST_SWINGS or not np.ptp(hip):
         return
+    # On a slope the hip also sinks steadily.
     trend = np.polynomial.Polynomial.fit(np.arange(hip.size), hip, 1)
     if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING:
         raise ConfigError(

@@ -312,6 +312,7 @@ def hinge_names(export: Exported) -> dict[int, Hinge]:
         d = IMPEDANCE
         if isinstance(stop, Impact):
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
+            # Knees bend towards negative angles. Their lower limit is too far away to act.
             acts += f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
         hinges[link] = Hinge(f"knee_{leg + 1}", acts)
     return hinges

@@ -117,6 +117,7 @@ class Walk:
         line = self.data.xanchor[self.hip.id] - point
         # Each foot walks in a lane to one side of the hip, but the push acts in the plane of the walk.
         line[1] = 0.0
+        # The integral of (share (1 - share))^2 from 0 to 1 is 1/30.
         force = 30.0 * (share * (1.0 - share)) ** 2 * impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]
         mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, self.data.qfrc_applied)

@@ -44,6 +44,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
     evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
+    # Of equal neighbours only the first is a peak.
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
     return [float(SUMS[peak]) for peak in peaks[np.argsort(-evidence[peaks])][:MOST_FOUND]]
 
@@ -100,8 +101,10 @@ def squares_around(t: Array, y: Array, instants: Array, degree: int, samples_per
     counts = np.searchsorted(t, instants)
     degrees = np.minimum(degree, 1 + np.stack((counts, t.size - counts)) // samples_per_degree)
     before = squares_before(t, y, instants, counts, degrees[0])
+    # The fit after an instant is the one before it, with time running backwards.
     mirrored = squares_before(-t[::-1], y[::-1], -instants[::-1], (t.size - counts)[::-1], degrees[1, ::-1])
     after = [values[::-1] for values in mirrored]
+    # Forcing both sides to meet costs their squared gap over the sum of the variances of its ends.
     gaps = np.sum((before[1] - after[1]) ** 2, axis=1)
     return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
 
@@ -117,13 +120,16 @@ def squares_before(
     end = int(counts.max())
     degree = int(degrees.max())
     span = np.array([t[0], max(float(t[end - 1]), float(instants.max()))])
+    # Powers would make the normal equations too ill-conditioned for this degree.
     basis, at = (
         chebvander(2.0 * (each - span[0]) / (np.ptp(span) or 1.0) - 1.0, degree) for each in (t[:end], instants)
     )
     columns = np.concatenate((basis, y[:end]), axis=1)
+    # All instants share these sums, so each one costs only the solution of a few equations.
     moments = np.cumsum([columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], axis=0)
     used = (np.arange(degree + 1) <= degrees[:, None]) & (counts[:, None] > 1)
     square = moments[:, : degree + 1, : degree + 1] * (used[:, :, None] & used[:, None, :])
+    # A coefficient that is not used still needs an equation, which makes it zero.
     square += np.eye(degree + 1) * (~used + RIDGE * counts[:, None])[:, None]
     right = np.concatenate((moments[:, : degree + 1, degree + 1 :], at[:, :, None]), axis=2) * used[:, :, None]
     solution = np.linalg.solve(square, right)
@@ -132,6 +138,7 @@ def squares_before(
     fitted = counts > 1
     squares = np.where(fitted, np.maximum(total - np.sum(explained[:, :-1], axis=1), 0.0), 0.0)
     values = np.sum(right[:, :, -1:] * solution[:, :, :-1], axis=1)
+    # A side without a fit can have any value at the instant, so an infinite variance makes the gap free of cost.
     return squares, values, np.where(fitted, explained[:, -1], np.inf)
 
 
@@ -145,6 +152,7 @@ def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[flo
     t, y = (time[rows] - instant) / half, angle[rows]
     if np.count_nonzero(t < 0.0) < SAMPLES_ON_A_SIDE or np.count_nonzero(t > 0.0) < SAMPLES_ON_A_SIDE:
         return None
+    # The kink comes last, so that its orthonormal column is the part that the cubic cannot follow.
     basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
     shares = basis.T @ y
     residual = float((y**2).sum() - (shares**2).sum())

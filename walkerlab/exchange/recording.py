@@ -97,6 +97,7 @@ PROGRAMS: Final = {
 
 
 C3D_PATIENCE_S: Final = 60.0
+# A parameter of a C3D file holds at most 255 labels. Further ones are in LABELS2, LABELS3 and so on.
 C3D_PROGRAM: Final = """
 import sys, ezc3d, numpy
 content = ezc3d.c3d(sys.argv[1])
@@ -153,6 +154,7 @@ def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, .
     name = f"{'.'.join(key)}: {shown}" if key else shown
     try:
         mode = path.stat().st_mode
+        # A folder passes, because the attempt to read it raises an OSError with the right reason.
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             advice = "Save what it delivers as a file first."
             raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
@@ -200,9 +202,11 @@ def read_delimited(path: Path) -> Recording:
 
 def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
     """Return the columns (count, samples) of a table whose cells are all plain numbers, or None for another table."""
+    # NumPy warns of input without rows.
     if not any(map(str.strip, lines)):
         return None
     try:
+        # A '#' makes the cell a text, for which the caller has a message, not the beginning of a comment.
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
@@ -226,6 +230,7 @@ def remove_blanks(lines: list[str]) -> list[str]:
     if not COMMAS_AND_BLANKS.fullmatch(last):
         return lines
     count = len(last.split())
+    # Names may contain single blanks, so a line is split at wider gaps if that gives the right number of cells.
     names = [re.split(" {2,}", line.strip()) for line in lines]
     return [";".join(wide if len(wide) == count else line.split()) for line, wide in zip(lines, names, strict=True)]
 
@@ -244,6 +249,7 @@ def text_of(path: Path) -> str:
             text = data.decode(encoding)
         except (UnicodeDecodeError, LookupError):
             continue
+        # Latin-1 decodes any bytes, so binary data show only by a NUL.
         if "\0" in text:
             break
         return text
@@ -267,6 +273,7 @@ def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[
     """
     tops = [(delimiter, list(rows_of(lines[:HEADER_LINES], delimiter))) for delimiter in DELIMITERS]
     places = [(rows[k : k + 3], delimiter) for delimiter, rows in tops for k in range(len(rows) - 1)]
+    # The sort is stable: if two delimiters fit the same line, the first of DELIMITERS wins.
     places.sort(key=lambda place: place[0][0][0])
     for fewest, only_words in product((2, 1), (True, False)):
         for ((_, names), *below), delimiter in places:
@@ -382,6 +389,7 @@ def clock_times(cells: Sequence[str]) -> Array | None:
     times = np.array([seconds_of(cell) for cell in cells])
     if not np.isfinite(times).all():
         return None
+    # A fall by more than half a day is midnight. A smaller one is an error in the file, which `columns` reports.
     return np.asarray(times + DAY_S * np.cumsum(np.diff(times, prepend=times[:1]) < -0.5 * DAY_S))
 
 
@@ -395,6 +403,7 @@ def seconds_of(cell: str) -> float:
         date = datetime.fromisoformat(cell)
     except ValueError:
         return math.nan
+    # Without a zone Python would assume that of this machine, whose clock jumps when summer time begins and ends.
     return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
@@ -411,6 +420,7 @@ def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callabl
     except ValueError:
         values = np.full(len(cells), np.nan)
     commas = [index for index, cell in enumerate(cells) if DECIMAL_COMMA.fullmatch(cell)]
+    # 1,234 can be 1.234 or 1234. Points elsewhere in the file speak for thousands.
     may_be_thousands = all(THOUSANDS.fullmatch(cells[index]) for index in commas)
     if commas and (any("." in cell and is_number(cell) for cell in cells) or (may_be_thousands and has_points())):
         return values, f"line {lines[commas[0]]}: {cells[commas[0]]!r} has a comma, but other numbers have points"
@@ -434,6 +444,7 @@ def read_adams_results(path: Path) -> Recording:
             f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
         ) from None
     components = component_names(path, root)
+    # The state at time 0 is only in the block initialConditions. Blocks named modelInput are no part of the walk.
     blocks = (block for block in root.iterfind(".//{*}Data") if not block.get("name", "").startswith("modelInput"))
     steps = [step for block in blocks for step in block.iterfind("{*}Step")]
     if not steps:
@@ -547,6 +558,7 @@ def read_markers(path: Path) -> Recording:
         )
     settings = dict(zip(split_at_tabs(lines[1]), split_at_tabs(lines[2]), strict=False))
     labels = split_at_tabs(lines[3].rstrip())
+    # Usually a name stands over the first of three coordinates. Some programs write the names without these gaps.
     spread = not any(labels[3::3]) and not any(labels[4::3])
     markers = labels[2::3] if spread else labels[2:]
     count = sum(map(bool, split_at_tabs(lines[4]))) // 3
@@ -585,6 +597,7 @@ def read_c3d(path: Path) -> Recording:
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
     if not any(labels) or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(labels):
         raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")
+    # ezc3d adds a fourth coordinate to each point.
     values = places[:3, : len(labels)].transpose(1, 0, 2).reshape(-1, places.shape[2])
     unit = str(arrays["units"][0]).strip() if arrays["units"].size else ""
     kind_units = {"time": "s", **({"length": unit} if unit else {})}
@@ -598,6 +611,7 @@ def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
         pass
     # Damaged files end ezc3d in segmentation faults, so a child process runs it.
     try:
+        # With -P, modules in the working folder cannot take the place of the real ones.
         command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]
         done = subprocess.run(command, capture_output=True, check=True, timeout=C3D_PATIENCE_S)
         with np.load(BytesIO(done.stdout), allow_pickle=False) as arrays:

@@ -93,6 +93,7 @@ class Strike:
         for count in counts:
             trials = np.linspace(begin, end, count)
             costs = costs_at(trials)
+            # The next interval, and the parabola at the end, need a trial on each side.
             best = min(max(int(np.argmin(costs)), 1), count - 2)
             begin, middle, end = trials[best - 1 : best + 2].tolist()
         # the vertex of the parabola through the best trials
@@ -143,6 +144,7 @@ class Strike:
         longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
         lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
         low, high = self.inner_samples(BORDER)
+        # Long stretches are tried at widely spaced places. The best one is refined below.
         short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
         inner = np.arange(*self.inner_samples(LASTING, whole=False))
         count = self.time.size
@@ -187,6 +189,7 @@ def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Ar
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
     """Return first sample, end and leg of the span that explains most of the residuals."""
     norm, share = parts_of(sums, spans)
+    # Where polynomials can follow a constant over a span almost entirely, dividing by the rest would magnify rounding.
     explained = np.where(norm > SMALLEST_NORM, 1.0 / np.maximum(norm, SMALLEST_NORM), 0.0)[:, None] * share**2
     best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
     return int(spans[best, 0]), int(spans[best, 1]), int(leg)
@@ -205,6 +208,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     course = course_of(time, angle, found)
     strikes = [course.strike(index) for index in range(len(course.spans))]
     sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
+    # Polynomials through sparse samples would follow errors, too.
     if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
         return found
     scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
@@ -231,6 +235,7 @@ def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
             returns = moved[first, leg] * moved[back, leg] < 0.0 and time[back] - time[first] < longest_s
             if returns:
                 found.append(Stretch(leg, first + 1, back + 1, float(moved[first, leg]), 0.0, lasts=False))
+            # A jump that does not return is skipped, but the next one may begin a stretch.
             jumps = jumps[2 if returns else 1 :]
     return found
 
@@ -269,6 +274,7 @@ class Course:
     rows: NDArray[np.int64]  # indices of the samples in the recording
     spans: list[tuple[float, float]]
     step_s: float
+    # `replace` leaves this empty, so that guesses made with wrong samples are not used without them.
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:

@@ -38,9 +38,8 @@ PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first 
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # fewest samples in that time
 JUMP_DEGREE: Final = 4
-JUMP_ERRORS: Final = (
-    4.5  # standard errors by which a jump must be displaced to count; many, because many instants are tried
-)
+# Standard errors by which a jump must be displaced to count. They are many, because many instants are tried.
+JUMP_ERRORS: Final = 4.5
 MOST_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
 SIDES: Final = 2
@@ -83,9 +82,11 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     height  function from angles (samples, 2) to the height (samples,) of leg 0's foot over leg 1's (m, normal to slope)
     """
     crossings = candidates(time, angle, height)
+    # The period is not known yet, so at first all consecutive crossings of a leg count as one strike.
     period = typical_interval([crossing for crossing, _ in merge_repeats(crossings, np.inf)], time)
     merged = merge_repeats(crossings, SHORTEST * period)
     located = [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in merged]
+    # A fit may move a crossing among the first samples to before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
     first = touch_at_start(time, angle, height, period)
     if first is not None:
@@ -105,6 +106,7 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
     spread = angle[:, 0] - angle[:, 1]
     over = height(angle)
+    # The feet are also level as the legs pass each other, where neither leg is far ahead.
     apart = WINDOW_AHEAD * np.abs(spread).max()
     crossings = []
     for i in np.flatnonzero((over[:-1] > 0.0) != (over[1:] > 0.0)):
@@ -196,11 +198,13 @@ def rows_within(time: Array, instant: float, half: float) -> slice:
 
 def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
     """Return the heel strike of a leg at the time (s) of a fit."""
+    # Close to the best step for central differences in double precision.
     small = 1e-6 * np.eye(2)
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
     gradient = (values[:2] - values[2:]) / 2e-6
     slope = float(gradient @ next(iter(fit.rates.values())))
     error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), LASTING_S) if slope else np.inf
+    # The height is that of leg 0's foot over leg 1's, so it rises as leg 1 comes down.
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
 
@@ -246,6 +250,7 @@ def fit_sides(
 
     Columns are in the order of the degrees, so that one factorisation serves all of them.
     """
+    # Powers of times in seconds would differ by many orders of magnitude.
     scale = float(np.ptp(t))
     powers = (t / scale)[:, None] ** np.arange(1, degrees[-1] + 1)
     by_side = np.stack([side[:, None] * powers for side in sides.values()], axis=2)
@@ -289,10 +294,12 @@ def angles_at_jumps(
     near = [(touch.time_s, rows_within(time, touch.time_s, half)) for touch in inside]
 
     shifts = np.linspace(-0.5, 0.5, SHIFTS) * half
+    # A shift is tried only if it leaves enough samples on both sides of every strike.
     for instant, rows in near:
         after = np.searchsorted(time[rows] - instant, shifts)
         fewer, more = np.sort((after, time[rows].size - after), axis=0)
         shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, LOPSIDED * more)]
+    # Shifts are judged against the strikes as they were found.
     if not near or not np.any(shifts == 0.0):
         return None
     squares = np.sum(
@@ -309,6 +316,7 @@ def angles_at_jumps(
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
     variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
+    # The smallest residuals at the end of the range may be on a slope that goes on, so they do not count either.
     if squares[shifts == 0.0][0] - least <= errors**2 * variance or not 0 < index < shifts.size - 1:
         return None
     # the smallest residuals between three trials, by a parabola

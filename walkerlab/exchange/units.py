@@ -15,6 +15,7 @@ LENGTHS: Final = {
 UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {
         "s": 1.0, "sec": 1.0, "second": 1.0, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3,
+        # Unicode has two letters that look like this one: the micro sign and the Greek mu.
         **dict.fromkeys(("us", "\u00b5s", "\u03bcs", "usec", "microsecond"), 1e-6),
         **dict.fromkeys(("ns", "nsec", "nanosecond"), 1e-9), "min": 60.0, "minute": 60.0,
     },
@@ -23,6 +24,7 @@ UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "length": LENGTHS,
     "speed": {f"{unit}/{second}": value for unit, value in LENGTHS.items() for second in ("s", "sec", "second")},
     "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
+    # Names are in lower case, so mJ and MJ are alike here. No walker has megajoules.
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip
 """Value of each unit in SI, by kind of quantity; unit names are in lower case and singular."""
@@ -33,6 +35,7 @@ def value_in_si(unit: str, kind: str) -> float | None:
     """Return the SI value of a unit, such as mm, Millimeters or [mm], or None if no quantity of this kind has it."""
     name = unit.strip().strip("[]()").strip().lower()
     values = UNIT_VALUES[kind]
+    # Some units end in s themselves, such as ms, so the s of a plural is removed only if the whole name is unknown.
     return values.get(name, values.get(name.removesuffix("s")))
 
 

@@ -170,6 +170,7 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
     way = walk.belt_m_s * float(steps.touch_time_s[-1])
     if walk.hip_is_in_m:
         ends = steps.origin_s + np.array([0.0, steps.touch_time_s[-1]])
+        # The walker may drift along the belt while it walks.
         way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
     share = way / float(steps.length_m.sum())
     doubts = steps.doubts
@@ -200,8 +201,10 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     )
     turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
     columns = np.column_stack((energy, turning))
+    # Heel strikes lose energy, so only changes within a step count.
     for number in range(int(steps.step[-1]) + 1):
         columns[steps.step == number] -= np.mean(columns[steps.step == number], axis=0)
+    # A tilt turns gravity. The two coefficients are its components, so together they give its size.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
     if 1.0 / FAR_CLOCK < rate < FAR_CLOCK:
@@ -234,6 +237,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
     for leg, name in enumerate(("angle 1", "angle 2")):
         if not (model, model.exchanged)[leg].kneed:
             continue
+        # A percentile, because the minimum may be an outlier.
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -301,6 +305,7 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
     if not courses[0] or not courses[1]:
         return None
     swing, stance = (np.mean(courses[0], axis=0)[k] - np.mean(courses[1], axis=0)[k] for k in (0, 1))
+    # Leg 1 stands while leg 0 swings, so the stance legs show the constant with the opposite sign.
     differences = np.array([swing, -stance])
     constant = float(np.mean(differences))
     return constant if float(np.std(differences)) < CONSTANT * abs(constant) else None
@@ -367,6 +372,7 @@ def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
+    # With a spring at the hip, a leg swings faster than it would hang, so there is no limit.
     swing_s = math.pi * math.sqrt(model.A[SWING, SWING] / weight) if weight and not model.sprung else 0.0
     if step_s < SHORTEST_STEP * swing_s:
         raise ConfigError(
@@ -424,11 +430,13 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     velocity = walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin
+    # A step ends just before its heel strike, because a sample at the strike begins the next step.
     side = SIDE * float(times[-1])
     spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
+    # A spline is least certain at its ends, where the fits of the heel strikes are better.
     for number, (_, angles, velocities) in enumerate(pieces):
         for row, touch, rates in end_fits(touches, number):
             angles[row] = touch.fit.angle[order]
@@ -471,6 +479,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
+    # Recorded values stay as they are. The spline serves only for the ends and for velocities.
     values[1:-1] = columns[inside]
     velocities = spline.derivative()(grid)[:, :2] if columns.shape[1] == 2 else values[:, 2:]
     return grid, values[:, :2], velocities

@@ -74,6 +74,7 @@ def walk_as_a_script(
         return np.concatenate([x[2:], np.linalg.solve(D, -C @ x[2:] - G)])
 
     def heel_strike(_t: float, x: Floats) -> float:
+        # Both feet are also on the slope at the start and when the legs scuff, but then the swing leg is not ahead.
         return float(x[0] + x[1] + 2.0 * slope) if x[0] > x[1] else 1.0
 
     event: Any = heel_strike
@@ -146,6 +147,7 @@ class RigidTrial:
 
         def run() -> TrialRun:
             clear_counts(solver)
+            # Calls reuse the solver, and the step size at the end of one walk must not help the next.
             solver.clock[H_NEXT] = 0.0
             status, _ = stride(walker, solver, finder, observer, np.array(self.start), strikes)
             return make_run(Outcome(status), strikes.after[-1], solver.counts)
@@ -226,6 +228,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
         # passed.
         for integrator in (passing, striking) if state[0] < state[1] else (striking,):
             integrator.time, integrator.state[:] = 0.0, state
+            # For a while after an event heyoka does not look for it again, even if time and state have been replaced.
             integrator.reset_cooldowns()
             outcome = integrator.propagate_until(limit)[0]
             if outcome.value >= 0 or abs(integrator.time) >= limit:

@@ -235,6 +235,7 @@ class PlainWalker:
         angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
         places = self.levers_about(foot, radius) * np.exp(1j * angles)
         inertias = self.inertias * [*[self.strike_inertia] * 3, 1.0, 0.0]
+        # The masses of both legs change places, as their angles do above.
         momentum = (places.conj().T * self.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
         if self.push_off:
             # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
@@ -323,6 +324,8 @@ class PlainWalker:
         before = event(start)
         for time, state in self.course(phase, start, tolerance):
             after = event(state)
+            # Both feet are on the slope at the start, too, and a straight leg scuffs in mid-swing. Neither is a fall
+            # from above.
             if before > 0.0 >= after:
                 share = before / (before - after) if self.interpolates else 1.0
                 move = float(share * (time - old_time))
@@ -377,6 +380,7 @@ class PlainWalker:
         Z = REDUCTIONS[STRAIGHT]
         angles, omega = self.bodies(BENT, state)
         M = self.mass_matrix(self.levers * np.exp(1j * angles), self.inertias)
+        # The impact acts within the leg, so it does not change the momenta of the coordinates that remain.
         return np.concatenate((state[:2], np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ omega)))
 
 

@@ -88,6 +88,7 @@ def run_until(
     ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground, 1, 1, start)
     walk_state.at_zero[:] = 0
+    # The rule that ends walks without heel strikes ends the run at its duration.
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
     times = np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
     observer = new_observer(walker, walk_state, start, times)
@@ -137,6 +138,7 @@ def solve_problem(
     try:
         value = run()
     except ArithmeticError:
+        # Far beyond any limit, but finite, because a result holds no infinity.
         value = math.copysign(1e300, reference)
     return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
 

@@ -167,10 +167,13 @@ class RigidMasses:
         push_offs  impulse of the push-off of each leg (N s)
         """
         change = 0.0
+        # A walker at rest has no momentum by which to divide.
         size = 1e-300
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             at_start = np.array(self.turns[k % 2].momenta(old, new=False))
             at_end = np.array(self.turns[(k + 1) % 2].momenta(new, new=True))
+            # The impulse acts along the trailing leg, so it has no moment about the hip and does not enter the second
+            # balance.
             at_start[0] += moment_of(push_offs[(k + 1) % 2], old)
             change = max(change, *np.abs(at_end - at_start))
             size = max(size, *np.abs(at_start), *np.abs(at_end))
@@ -245,6 +248,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
     if scene.walker.whole.push_off != 0.0:
+        # A short pulse must not lie between two points of the grid.
         pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
         pushed = (walk.touch_time_s[:, None] + pulse).ravel()
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
@@ -322,6 +326,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
         up = form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
         u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
+        # The integral of (u (1 - u))^2 from 0 to 1 is 1/30.
         bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_offs[pushing] / form.push_off_duration
         push = (bell / np.hypot(*line.T))[:, None] * line
         rates += np.column_stack([push, cross(foot, push)])

@@ -165,5 +165,6 @@ def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINA
     began = time.perf_counter()
     steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
+    # Rounding may leave the sum of just enough steps a little before the end.
     late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
     return arrival.judge_end(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)

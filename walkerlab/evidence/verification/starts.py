@@ -100,6 +100,7 @@ class RigidStart(CaseStart):
         pushes = (float(self.walker.push_off), float(self.walker.exchanged.push_off))
         distance = feet_off_the_slope(before) / self.walker.leg_length
         momentum_change = strikes.momentum_change(before, after, pushes)
+        # Push-offs may add energy.
         gain = 0.0 if any(pushes) else energy_won(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
@@ -191,6 +192,7 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
     leg = config.walker.leg_length_m
     rates = y[len(y) // 2 :]
     speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
+    # A lowered walker presses both feet into the ground.
     stored = 2.0 * elastic_energy(scene.walker.normal, case.lowered_m)
     energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
     return ContactStart(config, y, energy, scene)

@@ -111,6 +111,7 @@ class Spread:
                 if results:
                     self._arrived(batch[: len(results)], results)
                     rest = batch[len(results) :]
+                    # The worker was about to be ended, which is no failure of the units that it left.
                     self._again.extend([(rest, 0)] if rest else [])
                 else:
                     self._failed(batch, failures, error or JobEndedError(NOTHING_COMPUTED))
@@ -154,6 +155,7 @@ class Spread:
         elif failures < 3:
             self._again.append((batch, failures + 1))
         else:
+            # Without a time, all further batches would run alone.
             self.unit_s = self.unit_s or 1.0
             self.give_up(batch[0], error)
 

@@ -71,6 +71,7 @@ def end_with_parent() -> None:
     """
 
     def watch() -> None:
+        # The parent never writes, so this returns when its end of the pipe is closed.
         os.read(0, 1)
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(STORING_PATIENCE_S)
@@ -82,6 +83,7 @@ def end_with_parent() -> None:
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 WORKER_PATIENCE_S = 5.0
 """Time that a worker has to end before it is killed."""
+# A terminal interrupts workers as well, but only the parent reacts.
 START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -108,6 +110,7 @@ class WorkerDiedError(WalkerlabError):
         )
         self.exit_code_of_worker = exit_code
 
+    # By default, an error is restored from its message, which is not what `__init__` takes.
     def __reduce__(self) -> tuple[type, tuple[int]]:
         return type(self), (self.exit_code_of_worker,)
 
@@ -259,6 +262,7 @@ class WorkerPool(SizedExecutor):
         finally:
             with self._lock:
                 self._busy.remove(worker)
+                # If the worker has died, the next call removes it from the list.
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -318,6 +322,7 @@ _lines: list[Connection] = []
 
 def serve(number: int, modules: Sequence[str]) -> None:
     """Run calls until a signal ends this process. `number` is the file descriptor of the connection to the parent."""
+    # A program that a call starts would keep the connection open after this process has ended.
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)
@@ -339,6 +344,7 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
     with contextlib.suppress(EOFError, OSError):
         while True:
             calls.put(line.recv_bytes())
+    # `sys.exit` would end only this thread.
     os._exit(1)
 
 

@@ -163,6 +163,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
     Raises ValueError for other files, OSError if unreadable.
     """
+    # Without O_NONBLOCK, opening a pipe waits for a writer. Without O_BINARY, Windows changes bytes.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
@@ -210,6 +211,7 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 def csv_cell(value: Any) -> Any:
     """Convert a value to a CSV cell. Text that a spreadsheet would evaluate gets a leading apostrophe."""
+    # -1.5 is harmless, although it begins like a formula.
     if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
         return f"'{value}"
     return "" if value is None else value
@@ -236,6 +238,7 @@ class Checkpoint:
                 entry = json.loads(text.partition(b" ")[2])
                 if text != line(entry):
                     break
+                # The first line is the key.
                 if self._intact:
                     name, numbers = entry
                     self.kept[str(name)] = [float(number) for number in numbers]
@@ -250,6 +253,7 @@ class Checkpoint:
         if self.path is None:
             return
         with storing(self.path), self.path.open("r+b" if self._intact else "wb") as file:
+            # An earlier process may have been killed while it wrote its last line.
             file.truncate(self._intact)
             file.seek(self._intact)
             if not self._intact:

@@ -55,6 +55,7 @@ class GroupOnDisk(Group):
     """Variables at the root of an intact file, each read on access."""
 
     def __init__(self, file: Path) -> None:
+        # The checks of `Group` would read all variables.
         object.__setattr__(self, "variables", VariablesOnDisk(file))
         object.__setattr__(self, "attrs", {})
 

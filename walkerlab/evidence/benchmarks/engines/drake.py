@@ -109,6 +109,7 @@ class DrakeRun(adapter.Simulation):
 
         if self._discrete:
             for count in range(1, min(steps, round(until_s / self._h)) + 1):
+                # Updates are due at multiples of the step. At a time between two of them, rounding cannot omit one.
                 self._simulator.AdvanceTo((count + 0.25) * self._h)
                 if not on_step(count * self._h, *self._state()):
                     return
@@ -116,6 +117,7 @@ class DrakeRun(adapter.Simulation):
         remaining = [steps]
 
         def monitor(root: Any) -> Any:
+            # Drake also calls monitors when the simulator is initialised.
             if root.get_time() <= 0.0:
                 return EventStatus.DidNothing()
             remaining[0] -= 1
@@ -195,6 +197,7 @@ def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body
         return [plant.AddJoint(RevoluteJoint(link.name, parent_frame, child_frame, axis))]
     if model.freedoms == ("along", "height", "turn"):
         return [plant.AddJoint(PlanarJoint(link.name, parent_frame, child_frame))]
+    # Each slide is a joint of its own, so a body without mass connects the two.
     carriage = plant.AddRigidBody("carriage", SpatialInertia.Zero())
     x, y = np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0))
     along = plant.AddJoint(PrismaticJoint("along", parent_frame, carriage.body_frame(), x))

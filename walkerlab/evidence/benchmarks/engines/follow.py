@@ -26,6 +26,7 @@ from walkerlab.physics.solvers.scipy_methods import entry_point
 from walkerlab.physics.solvers.system import Floats
 
 Feet = tuple[FootMotion, FootMotion]
+# Enough for the rounding of a double.
 CROSSING_HALVINGS = 60
 DIVERGED_M = 1e4  # a run with a foot farther away than this has diverged
 
@@ -140,6 +141,7 @@ class RuleFollower:
                 continue
             walk_state.cells[foot], walk_state.has_ground[foot] = cell, has_ground_in_cell(cell)
             self._edges[foot] = self._edges_of(foot)
+            # The foot has met the flank of a pad, below its top.
             if walk_state.has_ground[foot] and now[foot].height < 0.0:
                 self._end(Outcome.OFF_PAD)
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
@@ -156,6 +158,7 @@ class RuleFollower:
             new = now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
+            # Engines have no states within a step, so the walker goes back with its velocities at the end of the step.
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             time_at_event = self.time_s + share * h
             if above:
@@ -230,6 +233,7 @@ class RuleFollower:
             far = contact_events.farthest_slide(ground.terrain)
             if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
+                # A round foot also moves away from its foothold as it rolls. Only the way of its material is sliding.
                 material = contact_state.material_along(self.scene.ours.whole, stance, now[stance].along, y)
                 if abs(material - self.walk_state.touched[stance]) > far:
                     self._end(Outcome.SLID)
@@ -250,6 +254,7 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
             low = middle
         else:
             high = middle
+    # The end on the far side of zero, so that the foot has crossed.
     return high
 
 
