@@ -26,6 +26,7 @@ def may_be_foreign(path: Path) -> bool:
 
 def make_private_folder(folder: Path) -> None:
     """Create a folder, and parents that do not exist, for this user alone."""
+    # `mkdir` with parents would give the parents the usual permissions.
     for each in (*reversed(folder.parents), folder):
         each.mkdir(0o700, exist_ok=True)
 

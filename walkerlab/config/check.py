@@ -62,6 +62,7 @@ def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
     if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
         return "rounded"
     longer = abs(right) - abs(printed.value)
+    # A value that is cut off to zero has lost its sign.
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
     return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
 
@@ -69,6 +70,7 @@ def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
 def parse_printed(text: str) -> PrintedValue | None:
     """Read a printed value, or return None if it has none of the allowed forms."""
     plain = text.strip().lower().replace("−", "-").replace("–", "-").replace("\xa0", " ")
+    # Publications write powers of ten in many ways, and copied text has several kinds of minus signs.
     plain = re.sub(r"\s*[×x·*]\s*10\s*\^?\s*\{?([-+]?\d+)\}?", r"e\1", plain).replace("+/-", "±").replace("+-", "±")
     plain = re.sub(r"\b10\s*\^\s*\{?([-+]?\d+)\}?", r"1e\1", plain)
     plain = re.sub(rf"\b({'|'.join(_WORDS)})\b", lambda match: _WORDS[match[1]], plain)

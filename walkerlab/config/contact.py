@@ -107,6 +107,7 @@ class Contact(Block):
         if not isinstance(data, dict) or data.get("units") != "si":
             return data
         exponent = data.get("exponent", 2.2)
+        # An invalid exponent is reported later.
         power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data

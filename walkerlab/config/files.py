@@ -179,10 +179,12 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
     advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to start from"
     try:
         mode = file.path.stat().st_mode
+        # Reading a pipe or a device might never end.
         if not stat.S_ISREG(mode):
             what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
             raise problem_error(reference, f"{kind} {file.label} is {what}", "a YAML file")
         with file.path.open("rb") as stream:
+            # A character in UTF-8 has at most four bytes.
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
         there_is = purpose or _describe_choices() if reference else f"a run, {_describe_choices()}"
@@ -232,7 +234,9 @@ def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
     _refuse_two_slopes(merged.keys)
     for layer in layers[1:]:
         _refuse_two_slopes(layer.keys)
+        # The name belongs to one file. A file that extends it is another run.
         lower = merged.copy_without("name")
+        # A slope in degrees replaces one in radians of a lower layer, and the other way round.
         if any(name in layer.entries for name in SLOPE_KEYS):
             lower = lower.copy_without(*SLOPE_KEYS)
         merged = _merge_blocks(lower, layer)

@@ -34,6 +34,7 @@ def value_of(text: str) -> str | int | float | bool | None:
     """Convert a plain scalar to a value by the rules of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
+    # Python takes quadratic time to convert a long integer.
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text)
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
@@ -68,6 +69,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
+        # The parser's own message only says that the character cannot start a token.
         if r"'\t'" in str(reason):
             raise problem_error(where, "a tab: YAML is indented by spaces", advice="Replace tabs by spaces.") from None
         raise problem_error(where, f"not YAML: {printable(str(reason))}") from None

@@ -72,6 +72,7 @@ def validate_tree(tree: BlockNode) -> Config:
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
     if isinstance(check := tree.entries.get("check"), BlockNode):
+        # In a printed value the zeros at its end count, too.
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
     if "slope_deg" in data:
         degrees = data.pop("slope_deg")
@@ -116,6 +117,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
             raise problem_error(where, f"start: value {place + 1} is null, but only {names} can be computed here")
     for place, (name, value, unit, because) in following.items():
         before, start[place] = stated[place], value
+        # Rounding of a stated value needs no remark.
         if before is None or abs(value - before) <= MOVED_RAD:
             continue
         change = f"start: {name} {{}} {fields.short_number(before)} {{}} {fields.short_number(value)} {unit}, {because}"
@@ -301,6 +303,7 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     if beyond:
         return Problem(parent.keys[name], f"{text}; {beyond}", ", ".join(siblings))
     similar = nearest(name, siblings) if "." not in name else ""
+    # A misspelling such as `slope` is as near to slope_rad as to slope_deg, and degrees are the more likely unit.
     if similar == "slope_rad" and "rad" not in name:
         similar = "slope_deg"
     intended = ".".join((*above, similar)) if similar else _find_key_elsewhere(name, exactly=bool(above))
@@ -330,6 +333,7 @@ def _keys_of_another_kind(
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
     """Return the path of the key with the nearest name (`exactly`: the same name) in any block, or an empty string."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(Config)))}
+    # The nearest name to a dotted one is looked for among whole paths.
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last

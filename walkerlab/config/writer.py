@@ -36,6 +36,7 @@ def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> s
 
 def slope_in_degrees(slope_rad: float) -> float | None:
     """Return the slope in degrees if a short number of degrees gives exactly this slope, otherwise None."""
+    # Twelve digits remove the rounding of the conversion, which makes 3.0000000000000004 degrees of 3.
     degrees = float(f"{math.degrees(slope_rad):.12g}")
     return degrees if math.radians(degrees) == slope_rad else None
 

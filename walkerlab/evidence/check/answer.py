@@ -121,6 +121,7 @@ class Checked:
         """The right gaits, with their values by the compiled model. The one that `fixedpoint` reports comes first."""
         names = state_names(self.config)
         found = {}
+        # False sorts before True, so the reported gait comes first.
         for gait in sorted(self.search.gaits, key=lambda gait: gait is not self.search.gait):
             rates = gait.state[len(names) // 2 :]
             extra = (rates[2],) if self.walker.kneed and self.walker.free_at_strike else ()
@@ -138,6 +139,7 @@ class Checked:
         start = None if printed is None else self.walker.start_from(printed[0], self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
+        # The search of the compiled model may miss a gait near the printed state.
         other = gait_near(self.walker, start, nearest.derivative) or nearest
         moved = np.abs(other.start - nearest.start).max() > SAME_GAIT
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
@@ -188,6 +190,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     values |= {f"work_per_step_J.{source}": work for source, work in summary["work_per_step_J"].items()}
     values["multipliers"] = tuple(complex(*pair) for pair in summary["multipliers"])
     for name, same in WALK_VALUES.items():
+        # On a gait all steps are equal, however many are printed.
         values[name] = [values[same]] * 1000 if name.startswith("step_") else values[same]
     return values
 

@@ -297,6 +297,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
         guess = question.guess(candidate.walker)
         if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
             guesses.append((question.miss(guess, question.quick_items), place, guess))
+    # The place decides between equal distances, because guesses themselves have no order.
     for _, place, guess in heapq.nsmallest(REFINED, guesses):
         yield from question.attempt(candidates[place], guess)
     if len(question.items) < FEW:
@@ -328,6 +329,7 @@ def fit(
         if without is None or there is None or near == begin:
             return None
         slope = (there - without) / (near - begin)
+        # A parameter that changes no printed value stays where it is.
         move = -float(slope @ without) / float(slope @ slope or math.inf)
         value = begin + move
         if not limits[0] <= value <= limits[1]:

@@ -112,6 +112,7 @@ class Convention:
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
         K = self.rows(n)
         tilt = walker.slope if self.origin == "vertical" else 0.0
+        # Bodies that are not printed keep their known motion, which makes the system square.
         free = [body for body in range(n) if not K[:, body].any()]
         square = np.vstack((K, np.eye(n)[free]))
         state = known.copy()
@@ -214,6 +215,8 @@ class CheckedStep:
         """Multipliers of the step map on its section, largest first. The one that is always zero is left out."""
         if self.derivative is None:
             return ()
+        # Just after a strike both feet are on the slope, so one combination of the coordinates never changes. Its
+        # multiplier is zero.
         values = sorted(map(complex, np.linalg.eigvals(self.derivative).tolist()), key=abs, reverse=True)
         return tuple(values[:-1])
 
@@ -274,6 +277,7 @@ class CheckedStep:
             return float(state[STANCE]) - upright
 
         for piece in self.step.pieces:
+            # The stance leg falls forwards, so its angle decreases.
             if piece.start[STANCE] > upright >= piece.end[STANCE]:
                 middle = self.walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
                 if middle is not None:
@@ -300,9 +304,11 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> Ch
                 return best
             slow = size > SLOW_RATIO * last
             last = size
+        # Rounding ends the progress of a search that has succeeded.
         elif best is None or last < MAX_RESIDUAL:
             return best
         elif is_own:
+            # The move was too long, even with the right derivative.
             x = 0.5 * (x + best.start)
             continue
         else:

@@ -70,6 +70,7 @@ def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     is the code of everything drawn.
     """
     text = json.dumps(own)
+    # If the word is the value of another key, the result depends on more code than necessary, which does no harm.
     used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}
     if stage.draws:
         used |= {code for extension in extensions().values() for code in extension.views()}

@@ -125,6 +125,7 @@ class Executor:
             with WorkerPool(self.jobs) as pool:
                 while self._waiting or self._running:
                     self._start_ready_stages(pool if side_by_side else None)
+                    # Messages of running stages also arrive here. Only the end of a call lets another stage start.
                     while self._working and not self._events.get()():
                         pass
                     self._early.draw(self._waiting, self._unsettled(), STILL_COMPUTED)
@@ -143,6 +144,7 @@ class Executor:
     def _start_ready_stages(self, pool: WorkerPool | None) -> None:
         """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
+            # Stages that measure run times would be disturbed by others.
             timing = any(running_stage.step.stage.work == "times" for running_stage in self._running.values())
             if timing or len(self._working) == self.jobs:
                 return
@@ -166,6 +168,7 @@ class Executor:
                 future = pool.start(call, partial(self._hear, running_stage.reporter))
                 self._running[future] = running_stage
                 self._working.add(future)
+                # Callbacks run in other threads, so they only put a call into the queue of this one.
                 future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 
     def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
@@ -266,6 +269,7 @@ def answer_in_memory(
     Executor(planner, reporter=reporter).carry_out()
     if target in planner.answers:
         return planner.answers[target]
+    # The target did not run because one of its inputs has no answer.
     advice = next(answer.no_answer.advice for answer in planner.answers.values() if answer.no_answer is not None)
     return Content({}, {"no_answer": {"message": planner.left_out[target], "advice": advice}}, complete=False)
 

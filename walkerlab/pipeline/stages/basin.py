@@ -69,6 +69,7 @@ def run(
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
+    # A walk that fails is another end than one that goes on without reaching an attractor.
     edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:

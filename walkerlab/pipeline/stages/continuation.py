@@ -50,6 +50,7 @@ class FamilyQuestion:
         """Return the values at which the search looks for gaits, the config's own value first."""
         current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
+        # A gait is most likely at the config's own value.
         return [*([current] if current in self.span else []), *(float(value) for value in spread)]
 
     @property
@@ -109,6 +110,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     for model in models_of(question):
         search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
+        # A branch may consist of a single point if it can be followed in neither direction.
         short = SHORTEST_REACH * question.span.size
         isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
@@ -365,6 +367,7 @@ def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
         flips = chain(first, family.branches)
         if len(flips) > 1:
             ratios = feigenbaum_ratios(flips)
+            # Distances between flips shrink by the last ratio from here on, so they form a geometric series.
             ends = {"accumulates_at": flips[-1] + (flips[-1] - flips[-2]) / (ratios[-1] - 1.0)} if ratios else {}
             yield {"period": first.period, "flips": flips, "ratios": ratios, **ends}
 
@@ -395,6 +398,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     attractors = family.attractors
     exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
+    # Between the last flip that was followed and the limit of the cascade, gaits of longer periods are stable.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
         attractor.value

@@ -72,6 +72,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         progress.start(f"design: search {number + 1} of {design.starts}")
         name = f"search {number}"
         before = gaits.counts.copy()
+        # Every search begins with the same gait, so that its result does not depend on the searches before it.
         gaits.z = own_z
         if name in checkpoint.kept:
             entry = np.array(checkpoint.kept[name])
@@ -145,6 +146,8 @@ def refuse(config: DesignConfig) -> None:
         refuse_unread("design.over", key, config, (design.model,))
     current = [parameter.value_in(config) for parameter in parameters]
     bounds = list(design.over.values())
+    # A bound is valid if it is so with the present values of the other keys, with all their lower or all their upper
+    # bounds.
     corners = np.column_stack((current, bounds)).T
     for index, parameter in enumerate(parameters):
         for bound in bounds[index]:
@@ -224,6 +227,7 @@ class Gaits:
                 return None
             smooth = {name: of_key[name].value or 0.0 for name in self.wanted}
             by_key.append(smooth | self.differentiate_largest(subject, numbers, parameter, gap))
+        # Both multipliers of a complex pair have the same magnitude, which does not count as a meeting.
         moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
         apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
         gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}

@@ -194,6 +194,7 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
+    # On a treadmill a step is as long as the way of the belt from touch to touch.
     if block.belt_speed_m_s and "length_m" not in values:
         values["length_m"] = block.belt_speed_m_s * period
     if "touch_angle_rad" in values:

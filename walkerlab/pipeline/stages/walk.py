@@ -261,6 +261,7 @@ def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) ->
         return samples
     step = np.searchsorted(ends, samples.time_s, side="right")
     stored = (step < FIRST_STEPS) | (step >= ends.size - LAST_STEPS)
+    # Velocities jump at heel strikes, so the samples on both sides of them are needed.
     changes = np.flatnonzero(np.diff(step))
     stored[changes] = stored[changes + 1] = True
     between = np.flatnonzero(~stored)

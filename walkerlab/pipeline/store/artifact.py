@@ -244,6 +244,7 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
 
     Raises Damaged if its digest or key does not match.
     """
+    # The version comes before everything else, because other layouts need not have the other attributes.
     if root.get("schema_version") not in READABLE:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     attributes = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}

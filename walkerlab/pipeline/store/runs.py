@@ -70,6 +70,7 @@ class RunFolder:
     @classmethod
     def open_folder(cls, path: Path) -> "RunFolder":
         """Return the run in a folder, with its recorded source and changes."""
+        # Only a resolved path has the folder's name.
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()
         if record is None:
@@ -164,6 +165,7 @@ class RunFolder:
                     say(f"waiting: {message} (`--name NAME` chooses another folder)")
                 lock.acquire()
         try:
+            # Under the lock every temporary file belongs to a process that was killed.
             remove_leftovers(self.path)
             worker = Holder(command_line(), os.getpid(), utc_now())
             with contextlib.suppress(OSError):  # only messages of other processes need this file
@@ -313,6 +315,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
         files |= {folder.artifact(stage), folder.checkpoint(stage)}
         with contextlib.suppress(OSError, Damaged):
             listed = indexed_files(read(folder.artifact(stage)))
+            # A list in a file from somebody else could name files outside the folder.
             files |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
     return sorted(path for path in files if path.is_file() or path.is_symlink())
 
@@ -320,6 +323,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
     """Return the run that a result, drawing or record belongs to, or None for the user's own files."""
     resolved = path.resolve()
+    # Results are in the run's folder, and drawings in a folder below it.
     for place in (resolved.parent, resolved.parent.parent):
         folder = RunFolder.open_folder(place)
         if folder.record() is None and not any(place.glob("*.h5")):

@@ -155,11 +155,13 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 
     Raises StorageError if that fails.
     """
+    # A point that failed is tried again in the next run.
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
     points = rows_group(rows, labels_of(PointResult), "point", "point of the chunk")
     content = Content({"points": points}, {"labels": {name: list(label) for name, label in chunk.labels.items()}})
+    # Chunks of equal points have the same name, so a repeated one replaces the old file.
     inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
     name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)

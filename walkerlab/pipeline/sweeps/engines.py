@@ -117,7 +117,10 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
         # result whose worker dies before handing it over.
         size = options.workers or max(1, len(client.nthreads()))
         executor = JobExecutor(
-            functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
+            # By default Dask gives equal calls the same result, so a second attempt would get that of the first.
+            functools.partial(client.submit, retries=0, pure=False),
+            size,
+            None if workers is None else workers.wait,
         )
         try:
             yield executor
@@ -155,6 +158,7 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", options)
+    # Options are texts, but submitit refuses counts that are texts.
     parameters: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in options.options.items()}
     cluster = str(parameters.pop("cluster", "slurm"))
     python = parameters.pop("python", None)
@@ -201,6 +205,7 @@ class SlurmQueue:
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
+        # The first question is asked at once.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:

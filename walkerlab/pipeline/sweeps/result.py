@@ -58,6 +58,7 @@ class SweepVariable:
             return
         if array.ndim != self.values.ndim:
             return  # a list where other points have a number cannot be stored
+        # NumPy also makes integers of switches and counts in one list.
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
         shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
         if shape != self.values.shape[1:]:
@@ -121,6 +122,7 @@ class Merge:
             if name not in self.columns:
                 self.columns[name] = SweepVariable(self.has_row.size, () if text else np.shape(first), text)
             column = self.columns[name]
+            # A column holds either texts or numbers. Its first value decides.
             have = [k for k in have if isinstance(rows[k][name], str) == column.text]
             column.put(np.array([indices[k] for k in have], int), [rows[k][name] for k in have])
 
@@ -265,4 +267,5 @@ def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tup
     for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)
+        # Only NaN differs from itself.
         yield f"{name}{ending}", ["" if value != value else value for value in column]

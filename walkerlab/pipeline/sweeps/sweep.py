@@ -113,9 +113,11 @@ class SweepRun:
         self.keys = Keys(graph)
         keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
+        # NumPy drops zero bytes at the end of a byte string.
         self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
         # index of the first point with each key
         self.first = np.full(len(unique), len(keys))
+        # `minimum.at` also counts repeated indices, unlike an assignment to them.
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
         over = {axis.key: list(axis.values) for axis in question.axes}
         base = loaded.config.model_dump(mode="json", exclude={"sweep"})
@@ -251,6 +253,7 @@ class SweepRun:
         """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
         stage = self.question.stage
         graph = self.keys.graph
+        # Workers keep inputs between chunks. The token keeps those of earlier sweeps out of a forced one.
         forced = token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:

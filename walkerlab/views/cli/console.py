@@ -197,6 +197,7 @@ class StageLine:
         """
         computed = time.monotonic() - self.work_began
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
+            # The first parts also load and compile code, so only the later half counts.
             half = bisect.bisect_left(self.progress, (self.done // 2,))
             done, start = self.progress[half - 1] if half else (0, 0.0)
             latest = self.progress[-1][1]

@@ -75,6 +75,7 @@ class Job:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(STORING_PATIENCE_S)
             with contextlib.suppress(ProcessLookupError):
+                # The command leads its own session, so this also ends the workers that it has started.
                 os.killpg(process.pid, signal.SIGKILL)
 
     def _make(self, kind: str, question: ExploredConfig) -> None:
@@ -101,6 +102,7 @@ class Job:
 
         Raises RuntimeError with its last message if it fails.
         """
+        # With -P, modules in the working folder cannot take the place of the real ones.
         command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
         # The output goes to a file, because a pipe would fill up while only stderr is read.
@@ -210,6 +212,7 @@ class Desk:
         with self._count:
             self._newest += 1
             number = self._newest
+        # The worker is busy with an earlier request, which nobody waits for any more.
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
@@ -381,6 +384,7 @@ class Handler(BaseHTTPRequestHandler):
     def check_origin(self) -> bool:
         """Check that this server's page sent the request, and answer with status 403 if not. Return whether it did."""
         origin = f"http://{self.server.host}"
+        # Pages of other sites can also send requests to this machine, but cannot change these headers.
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", origin) == origin:
             return True
         self.answer(*failure(403, "only this server's own page may send requests"))
@@ -396,6 +400,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def check_token(self, token: str) -> bool:
         """Check the token, and answer with status 401 if it is wrong. Return whether it is right."""
+        # The time of an ordinary comparison tells how many characters are right.
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))

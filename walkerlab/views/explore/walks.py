@@ -106,6 +106,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
         # A slider that starts close to zero must reach the typical size.
         most = max(most, ordinary) if logarithmic else most
+    # The slope's bounds are in radians, unlike its slider.
     if unit != "deg":
         least = max(least, low)
         most = min(most, high)

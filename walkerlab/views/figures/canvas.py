@@ -62,6 +62,7 @@ def blank(height: float) -> Figure:
     """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** HEIGHT_EXPONENT), layout="constrained")
+    # The canvas measures texts, on which the layout depends.
     FigureCanvasAgg(figure)
     return figure
 
@@ -149,6 +150,7 @@ OF_PIXELS = ("png", "tiff")
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
     """Return the figure as a file of one kind. `name` makes the ids in an SVG unique among figures."""
+    # Files of equal figures are equal to the byte, so they must not contain a date or a version.
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
         "png": {"metadata": {"Software": None, "Title": title}},
@@ -157,6 +159,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
         "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
     }
     file = io.BytesIO()
+    # By default, matplotlib makes ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(file, format=kind, dpi=dpi if kind in OF_PIXELS else PNG_DPI, **undated[kind])
     return file.getvalue()

@@ -68,6 +68,7 @@ def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
         return False
     gaps = np.diff(np.log(np.sort(values)))
     plain = np.diff(np.sort(values))
+    # The logarithms must be spaced evenly, and more evenly than the values themselves.
     return bool(gaps.max() / gaps.min() < min(1.01, plain.max() / plain.min()))
 
 

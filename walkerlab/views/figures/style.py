@@ -50,6 +50,7 @@ RC: Final = {
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
     "mathtext.fontset": "dejavusans",
+    # Type 42 is TrueType. Many journals reject matplotlib's default, Type 3.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
     "svg.fonttype": "none",

@@ -42,6 +42,7 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
     """
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
+        # The attribute is in the root element, at the beginning of the file.
         box = VIEW_BOX.search(file.read(2000))
     # size in CSS pixels, to reserve space while loading; 0 if unknown
     width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)

@@ -144,6 +144,7 @@ def escape_tex(value: Any) -> str:
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))
+    # Where two formulas touch, `$$` would begin a displayed one.
     return SCRIPTS.sub(join_scripts, SYMBOL.sub(symbol_in_tex, text).replace("$$", ""))
 
 

@@ -228,6 +228,7 @@ def our_walk(
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
     """Yield our runs over a ladder of tolerances, then our walks for comparison with engines' own contact."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
+    # This walk compiles the kernels, so it is not timed.
     our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
         answer = our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)

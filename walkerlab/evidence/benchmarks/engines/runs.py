@@ -88,6 +88,7 @@ class EngineWalk:
         while rules.outcome is None and not self.is_over and self.steps < self.task.max_steps:
             self._simulate(self.task.until_s)
             if rules.turn is not None:
+                # The shortened step ends at this turn, which must not stop it again.
                 rules.watches = False
                 wait_s = rules.turn.share * (self.seen_s - self.time_s)
                 if wait_s > TIME_ROUNDING * self.task.stepping.step_s:
@@ -282,6 +283,7 @@ class TuningTask:
         settled = self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
+        # Before its last fifth the block still settles into the ground.
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
