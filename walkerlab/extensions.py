@@ -47,9 +47,8 @@ class Study:
     """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
 
     own_walker: str  # function that tells whether a config has the walker of the study
-    equations: Mapping[str, str] = field(
-        default_factory=dict
-    )  # functions that change a rigid model, by value of the config key
+    # functions that change a rigid model, by value of the config key
+    equations: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

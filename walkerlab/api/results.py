@@ -281,6 +281,7 @@ def dataframe(group: Group) -> DataFrame:
             column = ".".join([name, *map(str, place)])
             columns[column], units[column] = part, variable.units
     index = pandas.MultiIndex.from_product([labels[dim] for dim in shared], names=shared)
+    # The labels of a MultiIndex are tuples, even if it has one level.
     frame = pandas.DataFrame(columns, index.get_level_values(0) if len(shared) == 1 else index)
     frame.attrs["units"] = units
     return frame

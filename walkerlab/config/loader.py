@@ -138,9 +138,8 @@ def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
         leg = places["leg_length_m"]
         mass = places["foot_to_mass_m"].source
         stays = walker.foot_to_mass_m
-        mass_was_changed = leg.source.startswith("built-in") or mass.startswith(
-            "--"
-        )  # the user changed the mass, not the leg
+        # In these cases the user changed the mass, not the leg.
+        mass_was_changed = leg.source.startswith("built-in") or mass.startswith("--")
         if leg.source != mass and not mass_was_changed and stays != walker.leg_length_m / 2:
             yield (
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m is still {short_number(stays)} m "

@@ -74,6 +74,7 @@ def validate_tree(tree: BlockNode) -> Config:
     if isinstance(check := tree.entries.get("check"), BlockNode):
         # In a printed value the zeros at its end count, too.
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
+    # The schema has only slope_rad, so a slope in degrees has a model of its own.
     if "slope_deg" in data:
         degrees = data.pop("slope_deg")
         try:

@@ -151,6 +151,7 @@ def check_second_leg() -> Any:
     """Validate the keys of `leg_2`: a walker with two legs like it must be valid."""
 
     def makes_a_leg(cls: Any, value: Any, info: ValidationInfo) -> Any:
+        # If another key is invalid, it is missing here, and its error is reported instead.
         if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
             try:
                 alike_second(cls, info.data, value)
@@ -507,6 +508,7 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
         swinging, stance = walker.legs
         shared = [body.name for body in walker.bodies if body.name not in (*swinging, *stance)]
         place = {name: k for k, name in enumerate((swinging[0], stance[0], *swinging[1:], *shared))}
+        # The parts of the stance leg are locked to each other, so they share its angle.
         place |= dict.fromkeys(stance, 1)
         for coupling in walker.couplings:
             coupled[place[coupling.body]] = (

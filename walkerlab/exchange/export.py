@@ -54,6 +54,7 @@ def export_model(
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
+    # MuJoCo's script simulates the plastic impact itself.
     locked = config if kind == "mjcf" else add_stops(config)
     export = prepare_export(locked, start)
     stem = stem or export.model_name

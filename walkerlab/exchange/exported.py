@@ -76,6 +76,7 @@ class Exported:
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
+            # There are more choices than other names, so one of them is free.
             choices = (name, *(f"{name}_{number}" for number in range(2, len(self.model.links) + 3)))
             names.append(next(choice for choice in choices if choice not in (*names, *RESERVED)))
         return tuple(names)

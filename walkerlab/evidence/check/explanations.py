@@ -218,6 +218,7 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
     Conventions come first, then misprinted values, then mistakes and misprinted parameters together, and at last these
     in other conventions.
     """
+    # Almost any cause can explain a single number.
     if sum(item.printed.bounds is None for item in question.items) < 2:
         return [], None
     if found := [*conventions(question), *misprinted_values(question)]:
@@ -393,6 +394,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius
         other = replace(walker, foot=foot)
+        # The foot must stay below the hip.
         gaits = (gait_near(other, start) for start in starts if foot.imag < 0.0)
         for gait in [*filter(None, gaits)][:1]:
             yield f"the stated leg length {how} the foot's radius", gait

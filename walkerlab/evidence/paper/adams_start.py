@@ -113,5 +113,6 @@ def first_below_zero(time: Array, values: Array) -> float | None:
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None
+    # The order is reversed, because `np.interp` needs rising values.
     around = [int(below[0]), max(int(below[0]) - 1, 0)]
     return float(np.interp(0.0, values[around], time[around]))

@@ -33,6 +33,7 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
         return y[1], gravity - impact_force(y[0], y[1], law) / mass
 
     def leave(t: float, y: Any) -> float:
+        # The ball is also at the surface as it lands.
         return float(y[0]) if t > 0.0 else 1.0
 
     leave.terminal, leave.direction = True, -1.0  # type: ignore[attr-defined]

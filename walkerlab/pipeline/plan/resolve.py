@@ -64,6 +64,8 @@ def resolve(
     for stage in PIPELINE.stages:
         stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
+    # A name that the user chose does not show the changes, so the source must, or other results in that folder would
+    # seem to be of the same config.
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
     return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), files.config_to_extend(text))

@@ -67,6 +67,7 @@ def run(
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
+    # Work units return floats, which a checkpoint can hold.
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
     # A walk that fails is another end than one that goes on without reaching an attractor.

@@ -129,6 +129,8 @@ def refit_with_new_strikes(
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
+    # Seen from the normal of the config's slope, both angles at a strike are off by the same error, that of slope and
+    # sensor.
     touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
     same_soles = rigid_walker(identified).alike
     if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:

@@ -121,6 +121,7 @@ def run(
         assert numbers is not None, "a gait has quantities"
         answer["gaits"].append({"model": subject.model, **numbers})
         answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
+        # Walks leave an unstable gait whatever the disturbance.
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue

@@ -105,6 +105,7 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
     with the same steps of the cycle, even if these come later. If the second walk has not settled yet, the error of
     the cycle is estimated by that of one step.
     """
+    # A list of slips lacks the last step if its foot has not lifted.
     count = min(len(first), len(second))
     values, others = (np.array(each[:count], float) for each in (first, second))
     changes = np.abs(values - others)

@@ -28,6 +28,7 @@ def main() -> None:
     # All matrices are small; threads that share one would spend more time waiting than computing.
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
+    # At its end Python collects garbage once more. Frozen objects are left out.
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
@@ -48,6 +49,7 @@ def main() -> None:
 def tolerate_output_errors() -> None:
     """Discard output to closed streams, and escape characters that cannot be encoded, as in undecodable file names."""
     for name in ("stdout", "stderr"):
+        # Python has no such object if the stream was closed when it started.
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
         getattr(sys, name).reconfigure(errors="backslashreplace")

@@ -148,6 +148,7 @@ class Request:
                 words += own.words
             elif stage is None or not isinstance(stage.takes, type) or block in keys_of(stage.takes):
                 words += ["--set", own]
+        # Not every command has --strides, but all that work on a run have --set.
         words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
         words += [] if self.name is None else ["--name", self.name]
         words += [] if self.runs == RUNS else ["--runs", str(self.runs)]

@@ -223,9 +223,8 @@ class Desk:
                     answer = self.worker.do(call)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    deaths += (
-                        error.exit_code_of_worker != -GIVE_WAY
-                    )  # the signal kills workers that have no handler yet
+                    # The signal for an earlier request kills workers that have no handler yet.
+                    deaths += error.exit_code_of_worker != -GIVE_WAY
                     if deaths > 1:
                         return failure(500, error.message, error.advice)
                 except Exception as error:

@@ -117,6 +117,7 @@ def curve_of(group: Group, name: str) -> Curve:
     # A bifurcation counts as stable, so that stable stretches reach up to it.
     known = np.insert(stable, places, True)
     on_mark = np.insert(np.zeros(stable.size, bool), places, True)
+    # Two neighbouring bifurcations have no gait between them that would show stability.
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
     marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
     return Curve(value, quantity, between, tuple(marks))
@@ -249,6 +250,7 @@ def closer_view(results: Results) -> tuple[float, float] | None:
     values = [item["value"] for item in summary["bifurcations"]]
     if not values:
         return None
+    # Attractors go on beyond the last bifurcation.
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least = min(values)
     most = max(*ends, max(values))

@@ -65,6 +65,7 @@ def draw_forces(results: Results) -> Drawn:
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
+    # Without friction the axis still needs two different ends.
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
     of_normal = walk.label("normal force", NORMAL_FORCE)
@@ -78,6 +79,7 @@ def draw_forces(results: Results) -> Drawn:
     cone.set(xlabel=of_normal, ylabel=of_friction, title="(c) against the friction cone")
     cone.set(xlim=(0.0, top), ylim=(-wide, wide))
     add_legend(figure, key)
+    # The ratio of two forces that are almost zero means nothing.
     borne = every > 0.1 * float(np.median(every.max(axis=1)))
     ratio = float((np.abs(whole[FRICTION][borne]) / every[borne]).max()) if borne.any() else 0.0
     return figure, (0 if walk is whole else SHOWN_STRIDES, ratio, every.max())
@@ -108,6 +110,7 @@ def draw_losses(results: Results) -> Drawn:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set(xlabel="step", ylabel="energy lost (J)")
     add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in by_cause])
+    # The first step does not begin with an impact. It counts only if there is no other.
     later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in by_cause.items()}
     return figure, (later, sum(later.values()))
 

@@ -132,6 +132,7 @@ class Sticks:
         """Return the indices of the first cycle's samples at its start and heel strikes, and of samples in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, POSTURES_BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
+        # A walk that ends within its first cycle is drawn up to its end.
         if strikes.size <= CYCLE:
             between.append(np.linspace(strikes[-1], self.time[-1], POSTURES_BETWEEN + 2)[1:])
         at_strikes = np.abs(self.time[:, None] - strikes).argmin(axis=0)

@@ -82,6 +82,7 @@ def fixed(value: float | None, decimals: int) -> str:
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{decimals}f}"
+    # A small negative number would be written as -0.00.
     return text.removeprefix("-") if float(text) == 0 else text.replace("-", MINUS)
 
 

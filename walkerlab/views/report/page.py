@@ -124,6 +124,7 @@ def inline(file: Path, alt: str) -> Markup:
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
     references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
+    # Ids that nothing refers to could clash with those of other drawings on the page.
     used = {value.removeprefix("url(").strip("#)") for value in references}
     inside = Markup("").join(markup(child, used) for child in root)
     box = root.get("viewBox", "0 0 1 1")

@@ -54,6 +54,7 @@ class Track:
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
+        # At a heel strike two samples have the same time: before and after it.
         jumps = np.flatnonzero(np.diff(time) <= 0.0)
         samples = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
         if "n0" in self.channels:

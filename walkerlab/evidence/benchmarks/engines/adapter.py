@@ -20,9 +20,8 @@ class Integrator:
     order: int  # nominal order of convergence
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
-    for_contact_only: bool = (
-        False  # run it only with the engine's contact; without contact it equals another integrator
-    )
+    # whether to run it only with the engine's contact, because without contact it equals another integrator
+    for_contact_only: bool = False
 
 
 @dataclass(frozen=True)

@@ -316,6 +316,7 @@ class EngineOnScene:
             row, answer = self.walk(contact, stepping, max_steps, native)
             yield row
             completed.append(stepping)
+            # A run that came to the time limit counts as if it had used up its budget.
             steps = answer.steps if not isinstance(answer, TaskLost) else max_steps if answer.timed_out else 0
             spent += steps
             if steps >= max_steps or (integrator.adapts and spent + steps > max_steps):

@@ -42,6 +42,7 @@ class MujocoRun(adapter.Simulation):
         model = self._model
         data = self._data
         advance = self._advance
+        # The arrays are views of MuJoCo's memory, so they follow the motion.
         q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
         for count in range(1, min(steps, round(until_s / h)) + 1):
             advance(model, data)
@@ -50,6 +51,7 @@ class MujocoRun(adapter.Simulation):
 
     def carry(self, ball: int, has_ground: bool) -> None:
         if self._model.npair:
+            # No distance is below a margin of this size, so the pair is never in contact.
             self._model.pair_margin[self._model.pair(f"foot {ball} on floor").id] = 0.0 if has_ground else NEVER_M
 
 
