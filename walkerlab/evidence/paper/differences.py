@@ -38,6 +38,7 @@ def motion_of(walk: Content) -> comparison.Motion | None:
     trajectory = walk["trajectory"]
     strikes = times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
+    # Where a knee does not lock, the time is NaN, which is not above 0.
     motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
     return comparison.add_strike_samples(motion)
 

@@ -156,6 +156,7 @@ def bouncing_ball_period() -> float:
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / EARTH_GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, EARTH_GRAVITY)
+    # The run ends in flight, from where the last landing follows exactly.
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
     in_flight = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY  # until the next landing
@@ -171,6 +172,7 @@ def restitution(law: Impact, speed: float) -> float:
     if not flying:
         return 0.0
     y = flying[0]
+    # Energy is constant in flight, so any sample of it gives the speed at the surface.
     return math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * EARTH_GRAVITY * y[BODY_HEIGHT]) / speed
 
 
@@ -178,6 +180,7 @@ def block_speed(slope: float, start_speed: float) -> float:
     """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
     law = PAPER_LAW
     foot = law.resting_foot(BLOCK_MASS * EARTH_GRAVITY * math.cos(slope), BLOCK_MASS)
+    # It starts at the depth at which it rests, so that it neither falls nor bounces.
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
     return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
@@ -198,6 +201,7 @@ def rimless_wheel_speed() -> float:
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
     wheel = rig(1.0, HUB_INERTIA, STIFF, STICKY, ((0.0, -1.0), ahead), WHEEL_SLOPE)
+    # The wheel starts too slow, so that it has to find the steady speed by itself.
     speed = 0.9 * references.wheel_upright_speed(SPOKES, WHEEL_SLOPE, EARTH_GRAVITY, HUB_INERTIA)
     for _ in range(ROUNDS):
         height = 1.0 - EARTH_GRAVITY * math.cos(WHEEL_SLOPE) / STIFF.stiffness

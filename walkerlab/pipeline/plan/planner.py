@@ -60,6 +60,7 @@ class Planner:
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
                 step = self._judge(self.graph[name], force=False)
+                # Nothing takes over an optional result from another folder.
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
                 elif step.damaged:
@@ -95,6 +96,7 @@ class Planner:
 
     def _judge(self, stage: Stage, force: bool) -> Step:
         reason = stage.why_unsuited(self.config)
+        # A drawing shows the results that exist, and says which are missing.
         for name in () if stage.draws else stage.inputs(self.config):
             if reason is None and name in self.left_out:
                 reason = f"it needs {name}: {self.left_out[name]}"

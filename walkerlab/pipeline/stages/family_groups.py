@@ -187,6 +187,7 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
         return
     scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
     unit, units = unit_walker(scene.walker)
+    # Gaits are followed for a walker of unit size.
     section = state_on_section(unit, point.z)
     n = len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
@@ -195,6 +196,7 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     if walk.steps < steps or walk.samples is None:
         return
     changes = np.flatnonzero(np.diff(walk.samples.step))
+    # Velocities jump at heel strikes, so the samples on both sides of them are kept.
     selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, SAMPLE_STRIDE), changes, changes + 1)))
     samples_group = trajectory_group(scene, walk, select_samples(walk.samples, selected))
     yield replace(samples_group, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

@@ -419,6 +419,8 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
+    # Many players show only yuv420p. ffmpeg cannot go back in a pipe to write the index of the file, so it writes
+    # fragments.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

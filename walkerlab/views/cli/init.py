@@ -68,6 +68,7 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
 def template(walker: str) -> str:
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
+        # Several built-in configs have walkers of one type. The first is its template.
         types.setdefault(load(Path(name)).config.walker.type, name)
     choices = types | {name: name for name in builtin_names()}
     if walker not in choices:

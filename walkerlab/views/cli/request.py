@@ -220,6 +220,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
 
     try:
         yield
+        # Otherwise an error of the output would appear at exit, as a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
         print_failed(error)
@@ -239,6 +240,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
             print_failed(too_long)
             print_error(too_long)
             raise typer.Exit(too_long.exit_code) from None
+        # An error without a file name is one of the output.
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()
@@ -301,6 +303,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
     settings = []
     for option in options:
         value = values[option.flag]
+        # 0 is a value, unlike an empty list.
         if option.runs or (not value and value != 0):
             continue
         if any(values[flag] is None for flag in option.needs):

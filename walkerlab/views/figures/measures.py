@@ -252,6 +252,7 @@ def letters(texts: Sequence[str]) -> int:
 def clear(dimension: Length, second: Length, length: float) -> bool:
     """Whether two dimensions in one lane, and their labels, do not overlap."""
     between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
+    # Slightly less than half of both, so that dimensions may meet end to end.
     return between > max(0.499 * (dimension.value + second.value), CLEAR * length)
 
 

@@ -22,6 +22,7 @@ ROBUSTNESS_STAGE: Final = "robustness"
 PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("sensitivity norm (s/m)", "gaits.{}.gait_sensitivity_norm", lambda norm: norm),
     ("1 − largest multiplier", "gaits.{}.spectral_radius", lambda radius: 1.0 - radius),
+    # Steps down are drawn below zero, and those up (`UP`) above it.
     ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
     ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
 )

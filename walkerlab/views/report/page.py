@@ -82,6 +82,7 @@ def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> lis
         if sum(sizes) <= most:
             break
         png = drawings[index][1]
+        # A drawing with little in it is smaller as SVG.
         if png.stat().st_size < sizes[index]:
             chosen[index], sizes[index] = png, png.stat().st_size
     return chosen

@@ -91,6 +91,7 @@ class ExudynRun(adapter.Simulation):
         stepping = settings.timeIntegration
         h = self.stepping.step_s
         stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
+        # Rounding must not add a step.
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
         stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods keep their step
@@ -126,6 +127,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
         for freedom in freedoms:
+            # Each freedom of the base needs a link of its own, of which only the last has a mass.
             last = freedom == freedoms[-1]
             hangs = link.parent >= 0
             offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)

@@ -207,6 +207,7 @@ def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, An
 
 
 def label_combination(combination: str, keys: Sequence[str]) -> str:
+    # A key may be part of a longer one, which is therefore replaced first.
     for key in sorted(keys, key=len, reverse=True):
         combination = combination.replace(key, axis_label(key))
     return combination
