@@ -170,7 +170,7 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     motion = against[0] - (against[1] if two else 0.0)
     motion = (motion - np.mean(motion, axis=0)) * ~vertical
     for _ in range(PLANE_FITS):
-        # The small term keeps both directions horizontal, even if the legs hardly move.
+        # The small term puts horizontal directions first, even if the legs do not move.
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
         # a marker that jumps sideways would turn the plane
         off = np.abs(motion @ sideways - np.median(motion @ sideways))

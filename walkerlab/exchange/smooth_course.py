@@ -274,7 +274,7 @@ class Course:
     rows: NDArray[np.int64]  # indices of the samples in the recording
     spans: list[tuple[float, float]]
     step_s: float
-    # `replace` leaves this empty, so that guesses made with wrong samples are not used without them.
+    # A course made by `replace` begins without guesses, because those made with wrong samples do not hold without them.
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:

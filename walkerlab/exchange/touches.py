@@ -316,7 +316,7 @@ def angles_at_jumps(
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
     variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
-    # The smallest residuals at the end of the range may be on a slope that goes on, so they do not count either.
+    # A minimum at an end of the range may in truth lie beyond it, so it does not count either.
     if squares[shifts == 0.0][0] - least <= errors**2 * variance or not 0 < index < shifts.size - 1:
         return None
     # the smallest residuals between three trials, by a parabola

@@ -116,11 +116,9 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
         # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
         # result whose worker dies before handing it over.
         size = options.workers or max(1, len(client.nthreads()))
+        # By default Dask gives equal calls the same result, so a second attempt would get that of the first.
         executor = JobExecutor(
-            # By default Dask gives equal calls the same result, so a second attempt would get that of the first.
-            functools.partial(client.submit, retries=0, pure=False),
-            size,
-            None if workers is None else workers.wait,
+            functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
         )
         try:
             yield executor

@@ -89,7 +89,7 @@ WORK_ROUNDING = 1e-12
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
     """Yield a column for each source of work. Values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
-
+        # The default keeps the present name, because the function is called after the loop has ended.
         def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
             work = record.get("work_per_step_J") or {}
             return (

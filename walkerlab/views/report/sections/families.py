@@ -63,6 +63,7 @@ class DiagramAxis:
     def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
         least = float(values.min())
         most = float(values.max())
+        # All values may be equal.
         room = 0.04 * (most - least) or 1.0
         self.least = least - room
         self.most = most + room
@@ -142,6 +143,7 @@ def curves(
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):
+        # A stretch begins with the last point of the one before, so that the line has no gap.
         stretch = slice(max(0, begin - 1), end)
         for period in branch["step_period"][stretch].T:
             points = zip(branch["value"][stretch], period, strict=True)
