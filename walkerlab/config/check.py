@@ -13,7 +13,7 @@ from walkerlab.config.fields import Block, Text, key, meaning_error
 Body = Literal["swing", "stance", "shank"]
 Instant = Literal["after-strike", "before-strike", "mid-stance"]
 MAX_PRINTED = 64  # maximum number of characters in a printed value
-_NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
+_NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?0{0,2}\d{1,2})?"  # some systems print e-005
 _SIGNED: Final = rf"[-+]?{_NUMBER}"
 _WORDS: Final = {
     "zero": "0", "half": "0.5", "one": "1", "two": "2", "three": "3", "four": "4", "five": "5", "six": "6",
