@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.patches import Arc
 
 from walkerlab.config.loader import load
-from walkerlab.config.schema import Config
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.measures import draw_measures
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, PALE, VERMILLION
@@ -21,27 +20,27 @@ from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, PALE, VERMIL
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
 PAGE = ROOT / "docs" / "walkers.md"
-OWN_PARTS = re.compile(r"```yaml\n(name: own-parts\n.*?)```", re.DOTALL)
-# Dimensions that are zero in a built-in config get a size, so that they are visible.
-PICTURES: dict[str, tuple[str, tuple[str, ...]]] = {
-    "compass": ("paper", ()),
-    "straight-legs": ("round-feet", ("walker.leg_mass_ahead_m=0.02", "walker.foot_centre_ahead_m=0.03")),
-    "kneed": ("kneed-round-feet", ("walker.shank.mass_ahead_m=0.04", "walker.foot_centre_ahead_m=0.03")),
-    "torso": ("torso", ()),
+EXAMPLE = re.compile(r"```yaml\n((?:# )?(?:name: )?(\S+)\n.*?)```", re.DOTALL)
+# The config on the page that each picture shows.
+PICTURES = {
+    "compass": "my-compass.yaml",
+    "straight-legs": "my-feet.yaml",
+    "torso": "my-torso.yaml",
+    "kneed": "my-knees.yaml",
+    "parts": "own-parts",
 }
 
 
 def pictures() -> dict[str, bytes]:
-    """Yield the pictures of docs/walkers.md by file name."""
-    found = {
-        f"walker-{name}.svg": draw_measures(load(Path(file), sets).config.walker, name)
-        for name, (file, sets) in PICTURES.items()
-    }
-    return {
-        **found,
-        "walker-parts.svg": draw_measures(config_of_parts().walker, "parts"),
-        "walker-angles.svg": draw_angles(),
-    }
+    """Draw the pictures of docs/walkers.md, from the configs on that page, and the leg angles, by file name."""
+    with tempfile.TemporaryDirectory() as folder:
+        for text, name in EXAMPLE.findall(PAGE.read_text(encoding="utf-8")):
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        drawn = {
+            f"walker-{name}.svg": draw_measures(load(Path(folder) / file, ()).config.walker, name)
+            for name, file in PICTURES.items()
+        }
+    return {**drawn, "walker-angles.svg": draw_angles()}
 
 
 def draw_angles(swing: float = -0.42, stance: float = 0.22) -> bytes:
@@ -71,16 +70,6 @@ def draw_angles(swing: float = -0.42, stance: float = 0.22) -> bytes:
         axes.annotate("", xy=(0.95, 1.1), xytext=(0.45, 1.1), arrowprops={"arrowstyle": "-|>"})
         axes.text(0.7, 1.15, "walking direction", ha="center")
         return files_of(figure, "angles", "Leg angles of the compass walker from the vertical", ["svg"])[0]
-
-
-def config_of_parts() -> Config:
-    """Return the config by which the page explains a walker made of parts."""
-    example = OWN_PARTS.search(PAGE.read_text(encoding="utf-8"))
-    assert example is not None, f"{PAGE} has an example named own-parts"
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "own-parts.yaml"
-        path.write_text(example[1], encoding="utf-8")
-        return load(path, ()).config
 
 
 if __name__ == "__main__":
