@@ -33,8 +33,8 @@ again: {right} are right, {wrong} are not.
 
 {made}
 
-This one, of a walker with round feet, is in a script that many programs have copied. It prints 15 digits, of which
-at most the first four are right:
+This one, of a walker with round feet, is from a script that many programs have copied. The script prints 15 digits,
+of which at most the first four are right:
 
 {story}
 
@@ -45,9 +45,10 @@ and adds a term that should not be there:
 -I * (rate of the trailing leg - rate of the leading leg)
 ```
 
-Here I is the leg's moment of inertia about its centre of mass. With this mistake all digits follow. A later script by
-the same author has the right heel strike ([passivewalker-sim](published-right.md#passivewalker-sim)). To see it for
-yourself, type this, or `published/NAME.yaml` with another name from the tables:
+Here I is the leg's moment of inertia about its centre of mass. With this mistake we get all digits of the
+script. A later script by the same author has the right heel strike
+([passivewalker-sim](published-right.md#passivewalker-sim)). To see it for yourself, type this (other names from the
+tables work as well):
 
 ```
 walkerlab check published/passivewalker-2009.yaml
@@ -62,16 +63,15 @@ Below are the gaits that differ, one by one. Those that are right have [a page o
 
 ## Gaits that differ
 
-{overview}
-
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
 one that shares no equations with it. For all {all} gaits they agree: after a step of the plain model from the gait of
-the compiled one, the state and the period differ by {routes} at most (angles in rad, rates and the period scaled with
-sqrt(L/g)). Each printed value gets a verdict:
+the compiled one, the state and the period differ by {routes} at most (angles in rad, times in units
+of the pendulum time sqrt(L/g)). Each printed value gets a verdict:
 
-- *Reproduced*: it agrees with the right one in all printed digits, after rounding or cutting off.
-- *Reproduced to n digits*: it agrees in n digits, at least three and at least half of those printed. The table says how
-  far off it is, in units of its last digit.
+- *Reproduced*: it agrees with the right one in all printed digits, after rounding or cutting off (-0.6058 may be
+  printed as -0.61 or -0.60).
+- *Reproduced to n digits*: its first n digits agree; n is at least three and at least half of those printed. "Off by
+  4.9 units" counts in units of the last printed digit.
 - *Different*: anything else.
 
 If values differ, the program looks for one cause: another convention, a mistake known from programs, or a misprint.
@@ -82,6 +82,8 @@ If values differ, the program looks for one cause: another convention, a mistake
 The signs and angles of each source are kept, and the right values are converted to them. *One exact step* is a step of
 the right equations from the printed state, without a noticeable numerical error. If the state is periodic, the step
 leads back to it.
+
+{overview}
 """
 TAIL = """## The longest case
 
@@ -156,7 +158,7 @@ def entry_of(file: Path) -> Entry:
     )
     reproduced = [row for row in rows if row["verdict"] == REPRODUCED]
     short = sum(map(is_short, rows))
-    note = f" ({short} not to the last digit)" if short else ""
+    note = f", {short} of them not in all digits" if short else ""
     in_the_table = ("The right gait", "Two independent")
     return Entry(
         name=file.stem,

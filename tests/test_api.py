@@ -45,7 +45,7 @@ def test_public_names_describe_arguments_and_show_an_example(name):
         assert {"Returns", "Raises"} <= {*text.split()}
 
 
-def test_python_interface_names_its_types():
+def test_python_interface_does_not_use_any():
     texts = [path.read_text() for path in Path(api.__file__).parent.glob("*.py")]
     assert len(texts) > 3
     assert not any(re.search(r"\bAny\b", text) for text in texts)
@@ -104,7 +104,7 @@ def test_warnings_of_the_command_line_are_python_warnings(ask, tmp_path):
     assert {one.filename for one in said} == {__file__}
 
 
-def test_moved_start_is_reported_in_memory():
+def test_python_call_warns_of_a_moved_start():
     with pytest.warns(UserWarning, match="^start: theta_1 moved from -0.2 to "):
         walkerlab.simulate(slope_deg=1, start=[-0.2, 0.17, -0.6, -0.86], strides=1)
 

@@ -66,7 +66,7 @@ def test_two_runs_at_once_do_not_disturb_each_other(kill):
     assert kill.together("simulate", "rigid-only", [2]) == []
 
 
-def test_both_ordinary_gaits_of_random_light_hipped_walkers_are_found():
+def test_both_gaits_of_random_walkers_with_light_hips_are_found():
     assert script("walker_campaign").tally("light-hips", 12, seed=1).wrong == []
 
 

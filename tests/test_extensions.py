@@ -251,7 +251,7 @@ def install_rods(site, module=RODS):
     (site.packages / "rods_walker.py").write_text(module)
 
 
-def test_walker_type_of_an_extension_walks_like_its_parts(site):
+def test_walker_of_an_extension_has_the_gait_of_equal_straight_legs(site):
     install_rods(site)
     (site.folder / "rods.yaml").write_text("name: rods\nslope_deg: 3\nwalker: {type: rods, leg_mass_kg: 4}\n")
     equal = {"leg_length_m": 1.0, "leg_mass_kg": 4.0, "leg_mass_below_hip_m": 0.5, "leg_inertia_kg_m2": 4.0 / 12.0}

@@ -152,7 +152,7 @@ def imported():
 def test_closure_contains_every_module_that_python_imports(name, imported):
     """The scanner reads text; the interpreter is the independent witness."""
     assert name in imported[name]
-    drawn = {code for extension in extensions().values() for code in extension.views()}
+    drawn = {code for extension in extensions().values() for code in extension.drawing_code()}
     added = {code.partition(":")[0] for code in drawn} if name in DRAWINGS else set()
     declared = {f"walkerlab{code.partition(':')[0]}" for code in walkerlab.EXTENSIONS.values()}
     assert imported[name] <= {module.name for module in Sources().closure(name, *added, *declared)}

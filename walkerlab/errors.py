@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 COMMAND_PATTERN: Final = re.compile(
     r"`(walkerlab (?!schema|open|init)([a-z-]+)(?: [A-Za-z0-9-]+)*?)(?: --set ([\w.]+)=([\w.+-]+))?`"
 )
-"""Pattern for commands in a message, with at most one setting, except those that do not act on a run."""
+"""Pattern for commands in a message that act on a run, with at most one `--set`."""
 
 SLOPES: Final = ("slope_rad", "slope_deg")
 

@@ -74,13 +74,13 @@ class Extension:
 
     def code(self) -> Iterator[str]:
         """Yield all code that the extension names."""
-        yield from self.views()
+        yield from self.drawing_code()
         yield from (code for key in WORDS for code in self.words(key).values())
         yield from (study.own_walker for study in self.studies)
         yield from (f"{stage.module}:run" for stage in self.stages)
         yield from (stage.adds_command for stage in self.stages if stage.adds_command)
 
-    def views(self) -> Iterator[str]:
+    def drawing_code(self) -> Iterator[str]:
         """Yield the code that drawings of results depend on."""
         yield from filter(None, (self.figures, *self.answers.values(), *self.tables.values()))
         for makers in self.sections.values():
@@ -106,7 +106,7 @@ class Found:
         """Names of the stages and of the words of config keys that it adds, and its code for figures and page."""
         extension = self.extension or Extension(INTERFACE)
         words = {key: [*extension.words(key)] for key in WORDS}
-        return {"stages": [stage.name for stage in extension.stages], **words, "views": [*extension.views()]}
+        return {"stages": [stage.name for stage in extension.stages], **words, "views": [*extension.drawing_code()]}
 
 
 def load(code: str) -> Any:

@@ -43,7 +43,7 @@ TILT = math.radians(1.5)
         ("-q", lambda a: -a, '"-q"'),
     ],
 )
-def test_a_column_may_have_another_sign_and_a_constant(header, change, source, tmp_path):
+def test_sign_and_offset_of_a_column_can_be_stated(header, change, source, tmp_path):
     time, angle = sampled()
     degrees = np.degrees(angle)
     first = change(degrees[:, 0])

@@ -240,7 +240,7 @@ def test_failing_stage_keeps_earlier_results(toy):
     assert actions(toy.execute("drop")) == {"drop": "reuse"}
 
 
-def test_jobs_option_reaches_stages_with_cells(toy):
+def test_jobs_option_reaches_stages_that_work_in_units(toy):
     assert toy.execute("survey", jobs=3).summary["jobs_wall_s"] == 3.0
 
 

@@ -385,12 +385,12 @@ def check(
     """Check a printed gait in memory.
 
     config   the walker: a Config, a config file or built-in name, or a run
-    printed  values by name, such as {"period_s": "0.60"}; None keeps those of the config's block `check`. Write texts,
-             because their digits count
+    printed  values by name, such as {"period_s": "0.60"}; None keeps those of the config's block `check`. Give strings,
+             because the number of digits counts
     keys     other keys of the block `check`, such as angles, instant, state_before
 
-    Returns a result whose `summary["values"]` has a verdict for each value, and `explanations` why they differ. Raises
-    ConfigError for invalid arguments, and for a config without printed values.
+    Returns a result whose `summary["values"]` has a verdict for each value, and whose `explanations` say why values
+    differ. Raises ConfigError for invalid arguments, and for a config without printed values.
 
     >>> check("simplest", {"state": ["0.20031", "-0.19983"]}, angles={"from": "slope-normal"}).finding
     'reproduced'
@@ -505,7 +505,7 @@ def add_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
 
 
 def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict[str, Setting]:
-    """Take the keys of a stage's block out of `keys`, and return the block with them and `values`, by its name."""
+    """Remove a stage's keys from `keys`. Return {stage: those keys together with `values`}."""
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage with a question has a block"
     block_keys = {name: keys.pop(name) for name in block.model_fields if name in keys}

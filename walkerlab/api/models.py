@@ -127,7 +127,7 @@ def _identity_of_gait(config: Config) -> Identity:
 def _export_texts(
     config: Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
 ) -> dict[str, str]:
-    """Return the files of a model, by name, after finding its gait unless it is passed."""
+    """Return a model's files by name. Find its gait first if `gait` is None."""
     from walkerlab.exchange import export
     from walkerlab.exchange.exported import GaitStart
     from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry

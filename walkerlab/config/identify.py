@@ -57,7 +57,9 @@ class Identify(Recorded):
         le=10_000_000,
     )
     robustness: bool = key(
-        False, "", "whether to report the identified gait's sensitivity norm (floor drop to step period)"
+        False,
+        "",
+        "whether to report the identified gait's sensitivity norm (change of the step period for a drop of the floor)",
     )
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"

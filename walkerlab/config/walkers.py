@@ -295,7 +295,7 @@ class KneeJoint(Block):
         "first touch",
     )
     damping_N_m_s_per_rad: float = key(
-        0.0, "N m s/rad", "damping of a knee while it bends; not together with a damper at the hip", ge=0.0, le=1e9
+        0.0, "N m s/rad", "damping of an unlocked knee; cannot be combined with a damper at the hip", ge=0.0, le=1e9
     )
     stop_stiffness: float = key(1.0e5, "N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)
     stop_damping: float = key(90.0, "N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)

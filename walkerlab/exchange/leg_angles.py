@@ -44,7 +44,7 @@ def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
     return replace(mended, quantities={**mended.quantities, **upright})
 
 
-def legs(walk: RecordedWalk) -> Array:
+def read_leg_angles(walk: RecordedWalk) -> Array:
     """Return the angles of both legs (samples, 2) from the vertical (rad)."""
     angle = walk.both_legs("angle")
     assert angle is not None, "a walk has the angles of both legs"
@@ -87,7 +87,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
 
 def swap_back(walk: RecordedWalk) -> RecordedWalk:
     """Swap the legs back where their angles change places from one sample to the next."""
-    angle = legs(walk)
+    angle = read_leg_angles(walk)
     swapped = swapped_rows(walk.time_s, angle[:, :1] - angle[:, 1:])
     if not swapped.any():
         return walk
@@ -102,7 +102,7 @@ def swap_back(walk: RecordedWalk) -> RecordedWalk:
 
 def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
     """Remove samples at which a leg leaves its course, and cut the walk where an angle jumps and does not return."""
-    stretches = find_stretches(walk.time_s, legs(walk))
+    stretches = find_stretches(walk.time_s, read_leg_angles(walk))
     off = np.zeros((walk.time_s.size, 2), bool)
     numbers = walk.quantities[SAMPLE]
     for stretch in stretches:
@@ -136,7 +136,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     The legs swing in opposite directions. As they pass each other, the swing foot moves forwards relative to the hip,
     and faster than the foot on the ground moves backwards.
     """
-    angle = legs(walk)
+    angle = read_leg_angles(walk)
     swing = angle - np.mean(angle, axis=0)
     second = -1.0 if "angle 1" not in walk.lines and float(swing[:, 0] @ swing[:, 1]) > 0.0 else 1.0
     directed = bool(walk.walks and walk.lines)
@@ -188,7 +188,9 @@ def trend(time: Array, values: Array) -> float:
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample between two stretches at which the hip turns round, or the middle one without markers."""
+    """Return the sample, between two stretches, at which the hip turns round. Without markers, return the middle
+    one.
+    """
     begin = before.passings[-1][1]
     end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)

@@ -67,7 +67,10 @@ def spell_rows(rows: NDArray[np.bool_]) -> str:
 
 
 def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
-    """Describe the samples at `rows` (samples,). `addition` returns a text for the first and last row of a stretch."""
+    """Describe the samples where `rows` (samples,) is true, by their `numbers`.
+
+    If given, `addition(first, last)` returns a text to append to each stretch.
+    """
     runs = apart_runs(rows, rows)
     places = [
         (f"sample {numbers[first]:.0f}" if first == last else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}")

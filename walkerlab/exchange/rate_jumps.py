@@ -52,7 +52,8 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
     """Return the squared scatter of the angles explained by rate jumps, divided by the variance that remains.
 
-    A jump is fitted in each run (first sample, last sample), where `over` (samples,) last falls through zero.
+    over  (samples,) the sum of the angles less the tried sum, rad
+    runs  pairs of first and last samples; a jump is fitted in each, at the last instant at which `over` falls through 0
     """
     jumps = []
     for first, last in runs:

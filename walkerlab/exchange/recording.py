@@ -62,7 +62,7 @@ CLOCKS: Final = tuple(
         r"P(?:(\d+)D)?T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?",
     )
 )
-"""Patterns for days, hours, minutes and seconds: of a clock, and in ISO's notation."""
+"""Patterns of durations, as on a clock (1:02:03) and in ISO 8601 (PT1H2M3S)."""
 DAY_S: Final = 86400.0
 SEGMENTS: Final = "Sports2D (angles)"
 SEGMENT_NAMES: Final = frozenset({"right thigh", "left thigh"})

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
-from walkerlab.exchange.leg_angles import legs
+from walkerlab.exchange.leg_angles import read_leg_angles
 from walkerlab.exchange.marker_lines import NAMED
 from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
 from walkerlab.exchange.smooth_course import FAR_PERCENT
@@ -33,7 +33,8 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-SHANK: Final = 1.4  # a leg whose farthest angle behind is this many times that at heel strikes is a shank
+# An angle is that of a shank if its backward maximum is this many times its value at heel strikes.
+SHANK_SWING_RATIO: Final = 1.4
 WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
@@ -85,7 +86,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
 
     Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """
-    angle = legs(walk)
+    angle = read_leg_angles(walk)
     refuse_noise(angle, source)
 
     def height(angles: Array) -> Array:
@@ -149,7 +150,7 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
 
     It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
-    angle = legs(walk)
+    angle = read_leg_angles(walk)
     total = partial(sum_over_level, model)
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
@@ -242,7 +243,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
             yield f"{name.capitalize()} is that of the line {walk.sources[name]}; {thigh}."
-        elif farthest < SHANK * (min(float(touch.fit.angle[leg]) for touch in touches) + model.slope):
+        elif farthest < SHANK_SWING_RATIO * (min(float(touch.fit.angle[leg]) for touch in touches) + model.slope):
             yield f"{name.capitalize()} swings far behind the leg, as a shank does; {thigh}."
 
 
@@ -426,7 +427,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     swapped = touches[1].leg == 1
     times = np.array([touch.time_s for touch in touches[1:]]) - origin
     order = [1, 0] if swapped else [0, 1]
-    angle = legs(walk)
+    angle = read_leg_angles(walk)
     velocity = walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin

@@ -28,7 +28,7 @@ from walkerlab.private_files import is_foreign, is_own, make_private, make_priva
 PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
 BUILT = PHYSICS / "machine_code"
-"""Folder of the machine code that the package's build has compiled."""
+"""Folder of the machine code compiled when the package was built."""
 REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
 ABOUT = "about.json"  # in that folder: what its code depends on
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")

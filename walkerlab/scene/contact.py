@@ -254,7 +254,9 @@ def ground_law(key: str, word: str, si: Any) -> Any:
             LAW_KINDS[key].laws[word] = load(added[word])
         return create_law(key, word, si)
     except (TypeError, ImportError, AttributeError) as error:
-        raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
+        protocol = LAW_KINDS[key].protocol
+        advice = f"{protocol.__name__} in {protocol.__module__} lists the members of a law."
+        raise ConfigError(f"{error}.", advice) from error
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:

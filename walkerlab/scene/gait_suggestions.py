@@ -43,8 +43,8 @@ class SlopeRange:
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the range, at its end nearer to `target`. The range of stable gaits takes
-        precedence.
+        """Return a slope just inside the end of the range that is nearer to `target`. Use the range of stable gaits
+        if there is one.
         """
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)

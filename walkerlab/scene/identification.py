@@ -132,7 +132,7 @@ class ConfigFamily:
 def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None = None) -> StepMap:
     """Return a model's step map as a function of the family's parameter values.
 
-    leg  the one that swings in the first complete step; by default that from the subject's state
+    leg  the leg that swings in the first complete step; by default the one that swings in the subject's state
     """
     swing = steps_before(subject, family, leg)
     step_map: StepMap

@@ -234,11 +234,11 @@ def test_conclusion_compares_with_the_best_library():
 def test_speedup_over_a_library_is_split_into_work_and_cost_per_evaluation():
     said = conclusion(MADE, "rigid")
     # 1600 against 800 right-hand sides, 8 s against 2 s: twice as many, each twice as costly
-    factors = "a factor of 2 from fewer right-hand sides, and 2 from the total cost of each: 2500 µs against 5000 µs"
+    factors = "2 times fewer right-hand sides, each 2 times cheaper: 2500 µs instead of 5000 µs"
     assert factors in said
-    assert "the library’s run in Python" in said
+    assert "the steps of the library run in Python" in said
     more = [made("dop853", 1e-10, 2.0), replace(made("scipy-bdf", 1e-10, 8.0), rhs_evaluations=400)]
-    assert "0.5 from more right-hand sides, and 8 from the total cost of each" in conclusion(more, "rigid")
+    assert "2 times more right-hand sides, each 8 times cheaper" in conclusion(more, "rigid")
 
 
 def test_speedup_is_not_computed_against_the_numpy_script():

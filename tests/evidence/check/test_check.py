@@ -101,7 +101,9 @@ def test_a_mistake_is_found_in_conventions_that_are_not_stated():
     config = load(PUBLISHED / "passivewalker-2009.yaml", ["check.angles.second=absolute"]).config
     (explanation,) = check_gait(config)["explanations"]
     assert explanation["kind"] == "mistake"
-    assert explanation["what"].startswith("the second angle is relative, stance leg minus swing leg, and the strike")
+    assert explanation["what"].startswith(
+        "the second angle is relative, stance leg minus swing leg, and the trailing leg's"
+    )
 
 
 def test_energy_is_constant_within_a_plain_swing():

@@ -42,7 +42,7 @@ def test_momentum_gain_equals_the_impulse_of_ground_and_gravity(name):
 @pytest.mark.parametrize(
     "changed", [{"hip_mass_kg": 10.01}, {"leg_mass_kg": 5.005}, {"foot_to_mass_m": 0.501}, {"leg_inertia_kg_m2": 0.05}]
 )
-def test_slightly_changed_walker_does_not_balance(changed):
+def test_momentum_does_not_balance_for_a_slightly_changed_walker(changed):
     config, *ready = ready_for("paper")
     other = config.model_copy(update={"walker": config.walker.model_copy(update=changed)})
     assert not momentum_finding(other, *ready).ok

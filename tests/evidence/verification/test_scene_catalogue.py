@@ -126,7 +126,7 @@ def test_summed_kinetic_energy_equals_that_of_the_equations(name):
 
 
 @pytest.mark.parametrize(("name", "sets"), [("kneed", (COMPLIANT,)), ("round-feet", ()), ("torso", ())])
-def test_scaling_any_walker_to_its_twin_and_back_restores_it(name, sets):
+def test_scaling_a_walker_up_and_down_again_restores_it(name, sets):
     config = config_of(name, *sets)
     by = to_twin(config)
     twin = scaled(config, by)

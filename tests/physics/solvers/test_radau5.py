@@ -197,7 +197,7 @@ def test_robertsons_reaction_ends_as_published(tol):
 
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-8])
-def test_hires_ends_as_published(tol):
+def test_hires_problem_ends_at_the_published_state(tol):
     method = integrated(Kinetics(HIRES), HIRES_START, 321.8122, tol, 1e-4 * tol)
     np.testing.assert_allclose(method.y, HIRES_END, rtol=50 * tol)
 

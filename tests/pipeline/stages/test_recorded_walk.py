@@ -447,7 +447,7 @@ LIMPING = {
 
 @pytest.mark.parametrize("begins", ["at the first step", "in the first step"])
 @pytest.mark.parametrize("name", LIMPING)
-def test_recording_of_legs_that_differ_begins_with_leg_1_and_has_the_same_steps(name, begins, tmp_path):
+def test_recording_of_a_simulated_limp_has_its_steps_and_begins_with_leg_1(name, begins, tmp_path):
     own, *sets = LIMPING[name]
     config = load(Path(own), (*sets, "strides=4")).config
     walk = run_in_memory("simulate", config)

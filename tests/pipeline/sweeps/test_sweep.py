@@ -166,7 +166,7 @@ def test_result_of_a_single_run_is_reused(toy, marks):
 def test_sweep_keys_equal_those_of_the_pipeline(toy):
     config = toy.sweep("roll", GRAVITIES).config(1)
     report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
-    keys = Keys(toy.graph).compute(config, "roll")
+    keys = Keys(toy.graph).compute_keys(config, "roll")
     assert keys == {name: artifact.read(toy.runs / "alone" / f"{name}.h5").identity.key for name in ("drop", "roll")}
     assert report.summary == answer_in_memory(config, "roll", MemoryResults(toy.graph)).summary
 
@@ -178,7 +178,7 @@ def test_point_has_the_key_of_its_single_run(name, tmp_path):
     folder = RunFolder(tmp_path, loaded.run_name)
     steps = Planner(loaded.config, FolderResults(folder), stages).plan()
     single = {step.stage.name: step.identity.key for step in steps}
-    assert {stage.name: Keys().compute(loaded.config, stage.name)[stage.name] for stage in stages} == single
+    assert {stage.name: Keys().compute_keys(loaded.config, stage.name)[stage.name] for stage in stages} == single
 
 
 def test_engine_version_changes_only_the_key_of_the_stage_engines(monkeypatch):
@@ -187,7 +187,7 @@ def test_engine_version_changes_only_the_key_of_the_stage_engines(monkeypatch):
     keys = []
     for version in ("1.0", "1.1"):
         monkeypatch.setattr(extension.Engine, "version", version)
-        keys.append(Keys().compute(config, "engines"))
+        keys.append(Keys().compute_keys(config, "engines"))
     assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
 
 

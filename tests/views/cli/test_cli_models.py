@@ -109,7 +109,7 @@ def test_missing_figure_is_not_replaced_by_another(edited):
     assert "Did you mean" not in done.stderr
 
 
-def test_model_of_an_edited_config_follows_the_file(walker):
+def test_export_of_an_edited_config_uses_the_edited_walker(walker):
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
     walker("fixedpoint", "-c", "light.yaml")
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")

@@ -154,7 +154,7 @@ def test_clean_frees_the_run_name(toy):
     assert toy("drop", "-c", "there/stone.yaml").returncode == 0
 
 
-def test_command_suggested_by_an_export_makes_it_work(walker):
+def test_failed_export_succeeds_after_the_suggested_command(walker):
     there = walker.folder / "here"
     there.mkdir()
     assert walker("fixedpoint", "-c", "rigid-only", "--runs", "r5").returncode == 0
@@ -314,7 +314,7 @@ def test_provenance_keeps_a_command_with_undecodable_names(toy):
 
 
 @pytest.mark.parametrize("config", ["extends: /etc/hostname\n", "stability: {cases: /etc/hostname}\n"])
-def test_config_stored_in_a_result_opens_no_file(toy, config):
+def test_stored_config_that_refers_to_a_file_is_rejected(toy, config):
     toy("drop")
     path = toy.folder / "runs/paper/drop.h5"
     stored = artifact.read(path)

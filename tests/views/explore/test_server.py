@@ -354,7 +354,7 @@ def test_terminated_server_leaves_no_worker_or_report_process(tmp_path):
         one.close()
 
 
-def test_report_process_ends_with_a_killed_server(tmp_path):
+def test_report_process_ends_when_the_server_is_killed(tmp_path):
     one = Served(tmp_path)
     assert one.asked("/api/job", {"kind": "report"})[0] == 200
     while not at_work_for(tmp_path):

@@ -87,7 +87,7 @@ def test_branch_is_solid_up_to_its_flip_and_dashed_beyond():
     assert STYLES[True] == "-"
 
 
-def test_doubled_branch_begins_at_the_flip_of_its_parent_with_equal_steps():
+def test_steps_of_a_doubled_branch_are_equal_at_the_flip_where_it_begins():
     group = families()["continuation"]["rigid/branch_1"]
     curve = curve_of(group, "step_period")
     assert curve.value[0] == FLIP

@@ -63,7 +63,7 @@ def test_incomplete_cycle_is_drawn_to_its_end():
     assert "not completed" in FIGURE_2.render(results).caption
 
 
-def test_slope_label_is_above_the_named_torso():
+def test_slope_label_is_above_the_torso():
     bare = read_sticks(rigid_alone()["simulate"])
     sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
     with figure_style():
@@ -73,6 +73,11 @@ def test_slope_label_is_above_the_named_torso():
     bottom = axes.transData.inverted().transform(label.get_window_extent())[0, 1]
     assert bottom > sticks.project(sticks.head)[:, 1].max()
     assert axes.get_ylim()[1] > axes.transData.inverted().transform(label.get_window_extent())[1, 1]
+
+
+def test_legend_names_a_torso_only_if_there_is_one():
+    bare = read_sticks(rigid_alone()["simulate"])
+    sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
     assert "torso" in [entry.get_label() for entry in entries(sticks)]
     assert "torso" not in [entry.get_label() for entry in entries(bare)]
 

@@ -36,7 +36,7 @@ WALK_VALUES: Final = {
     "mean_energy_J": "energy_J", "last_step_period_s": "period_s", "last_step_length_m": "step_length_m",
     "step_periods_s": "period_s", "step_lengths_m": "step_length_m",
 }  # fmt: skip
-"""Values of `simulate` that may be printed, with the equal values of `fixedpoint`."""
+"""Names of `simulate` under which a value may be printed, each with the quantity of `fixedpoint` that it equals."""
 
 
 def refuse_unknown(check: Check) -> None:
@@ -75,7 +75,7 @@ class Checked:
 
     @cached_property
     def items(self) -> list[Item]:
-        """Printed numbers of a gait, those of states first."""
+        """Printed values of a gait, states first."""
         listed = states_of(self.check)
         return items_of({**listed, **self.check.printed}, {name: self.stated(name).names for name in listed})
 

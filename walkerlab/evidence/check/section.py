@@ -124,7 +124,7 @@ def remarks(summary: Row) -> Iterator[str]:
         yield summary["undecided"]
     if near := summary["closest"]:
         yield (
-            f"The nearest candidate is a {near['kind']}: if {near['what']}, the largest difference falls from "
+            f"A {near['kind']} comes nearest: if {near['what']}, the largest difference falls from "
             f"{number(near['without_in_units'], 2)} to {number(near['miss_in_units'], 2)} units of the last digit."
         )
     yield from state_remarks(summary)
@@ -162,10 +162,10 @@ def state_remarks(summary: Row) -> Iterator[str]:
             yield f"It would be periodic with {' or '.join(changes)}."
     broken = [each for each in summary["momenta"] if not each["conserved"]]
     if broken:
-        changes = [f"{each['about']} by {number(each['residual'], 3)} {each['unit']}" for each in broken]
+        changes = [f"that of {each['about']} by {number(each['residual'], 3)} {each['unit']}" for each in broken]
         kept = [each["about"] for each in summary["momenta"] if each["conserved"]]
         fine = f" That of {join_words(kept)} is conserved." if kept else ""
         yield (
             f"The heel strike before this state ({broken[0]['before']}) changes the angular momentum of "
-            f"{join_words(changes)}.{fine}"
+            f"{join_words(changes).removeprefix('that of ')}.{fine}"
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from walkerlab.evidence.paper.measured import Errors
 from walkerlab.physics.hybrid import comparison
-from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, legs, variables_over_time
+from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, leg_labels, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
 
 STEPS_PER_STRIDE = 2
@@ -78,7 +78,7 @@ def compare_motion(
         "errors": Group(
             {
                 **variables_over_time(time=time),
-                **legs(),
+                **leg_labels(),
                 **differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time"),
             }
         )
@@ -93,7 +93,7 @@ def compare_motion(
         coordinates = {
             **numbered(len(aligned.angle), STEP, "step number"),
             PHASE: Variable(phases, (PHASE,), "1", "time within the step as a fraction of its period"),
-            **legs(),
+            **leg_labels(),
         }
         in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), f"{meaning}, at the same phase")
         groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
@@ -102,7 +102,9 @@ def compare_motion(
             errors["settled"] = select(select(aligned, last), smooth[last])
             distances = comparison.orbit_distances(contact, rigid)
             text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
-            groups["orbit"] = Group({**legs(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")})
+            groups["orbit"] = Group(
+                {**leg_labels(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")}
+            )
             orbit = distances.tolist()
     what, needed = missing
     lacking = {"what": what, "why": f"no {needed} was completed by both models"}

@@ -35,7 +35,7 @@ from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
     TIME,
     count_outcomes,
-    legs,
+    leg_labels,
     numerical_error,
     rigid_start,
     step_columns,
@@ -348,7 +348,7 @@ def groups(tune: TuneRun) -> dict[str, Group]:
         stored["gait"] = gait_group(tune.gait.gait, tune.scene)
     rigid = tune.rigid_walk.samples
     if rigid is not None and rigid.time_s.size:
-        in_time = {**legs(), **variables_over_time(time=rigid.time_s), **leg_variables(rigid)}
+        in_time = {**leg_labels(), **variables_over_time(time=rigid.time_s), **leg_variables(rigid)}
         stored["rigid_start"] = Group({**in_time, **step_columns(tune.rigid_walk.touch_time_s)})
     for name, walk in tune.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
@@ -365,7 +365,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
     if walk.samples is None:
         return {}
     angle, velocity = leg_motion(walk.samples.states, walker)
-    return {**legs(), **variables_over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
+    return {**leg_labels(), **variables_over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
 
 
 def map_group(tune: TuneRun) -> Group:

@@ -54,7 +54,9 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile. The others start by decreasing budget."""
+    """Yield results in case order. One case per model runs first, to compile. The others start in
+    order of decreasing budget.
+    """
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return map_in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)

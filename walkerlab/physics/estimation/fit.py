@@ -280,15 +280,15 @@ def linearise(
     trimmed = np.zeros_like(from_even)
     if problem.loss == "soft_l1" and robust is not None:
         residuals = from_even - G[:, : disturbances.size] @ disturbances
-        trimmed = residuals - trim(residuals, forecast.quantity, robust)
+        trimmed = residuals - compute_pseudo_residuals(residuals, forecast.quantity, robust)
     rows = problem.prior_rows(u)
     sizes = typical_sizes(forecast)
     kicks = G.shape[1] - heights.size
     return Linearised(from_even - trimmed, J, G, forecast.quantity, rows, sizes, trimmed, kicks)
 
 
-def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
-    """Return pseudo-residuals (values,) whose least-squares fit, noise and errors are those of the soft_l1 loss.
+def compute_pseudo_residuals(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
+    """Return pseudo-residuals (values,). Least squares on them gives what the soft_l1 loss gives on the residuals.
 
     With the loss's derivative psi(x) = x / sqrt(1 + x^2) of residuals in units of their scatter, least squares on
     psi / mean(psi') has the fixed point and the covariance of the robust fit; another factor corrects for short walks.

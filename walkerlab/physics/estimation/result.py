@@ -10,7 +10,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Fit = Literal["fits", "fits-but", "misfit", "not-converged"]
 USABLE: Final = ("fits", "fits-but")
-"""Verdicts on walks that a model explains, the better first."""
+"""Verdicts that mean that a model explains the walk, the best first."""
 
 
 @dataclass(frozen=True)

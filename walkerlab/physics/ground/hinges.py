@@ -58,7 +58,7 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
 
 @kernel_part
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
-    """Return the body that a hinge's torque turns back, and the one that it turns forward."""
+    """Return the body that a hinge's resistance turns back, and the one that it turns forward."""
     body = system.form.hinges[row, 0]
     other = system.form.hinges[row, 1]
     return (other, body) if hip_sign(system, row) < 0.0 else (body, other)

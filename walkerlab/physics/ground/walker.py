@@ -1,4 +1,6 @@
-"""Walker on compliant ground: a tree with ball feet, whose form depends on locked knees and a pinned foot.
+"""Walker on compliant ground: a tree of bodies with ball feet.
+
+Its form depends on which knees are locked and whether a foot is pinned.
 
 The state is (along, height, theta_1 .. theta_n) and their rates: the position (m) of the centre of mass along the slope
 (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an ideal lock holds a
@@ -148,7 +150,9 @@ PROGRESS = tree.record_type(WalkProgress, {})
 
 
 def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
-    """Create the progress of a walk on foot `stance` after some steps, the last of which ended at `last_touch` (s)."""
+    """Create the progress record of a walk that stands on foot `stance` after `steps` steps. The last one ended at
+    `last_touch` (s).
+    """
     progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
     return progress
 

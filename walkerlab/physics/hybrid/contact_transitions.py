@@ -231,6 +231,7 @@ def touch(
     walk_state.leaving[foot] = 0
     walk_state.progress.last_touch = t
     walk_state.progress.stance = foot
+    # The step has ended, although the walk goes on.
     walk_state.progress.steps = step + 1
     find_ground(walk_state, stance, is_above(walk_state, stance))
     follow_strike(form, walk_state, stance)

@@ -172,7 +172,7 @@ def take_step(
 ) -> tuple[int, float]:
     """Take one step, a swing and its heel strike, from time t (s). Afterwards y holds the state and tangent columns.
 
-    walker  as in `walk`; of legs that differ, leg 1 swings in even steps
+    walker  as in `walk`; if the legs differ, leg 1 swings in even steps
 
     Returns WALKED and the time of the heel strike, with the state before the strike in `method`; if the step fails,
     returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.

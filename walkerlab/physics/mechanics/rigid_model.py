@@ -107,7 +107,9 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     @property
     def exchanged(self) -> "RigidModel":
-        """Model of the next step, in which the legs have exchanged their roles. This model itself for equal legs."""
+        """Model of the next step, in which the legs have exchanged their roles. If the legs are
+        equal, this is the model itself.
+        """
         return self if self.paired_with is None else pair(self.paired_with, self)
 
     def __eq__(self, other: object) -> bool:
@@ -129,7 +131,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
 
 def replace_fields(model: Any, fields: Any) -> RigidModel:
-    """Return a read-only copy of a model without a partner, with some fields changed."""
+    """Return a read-only copy of a model with some fields changed. The copy has no partner."""
     memory: Any = np.empty((), model.dtype)
     memory[()] = model
     tree.write_fields(memory, fields)

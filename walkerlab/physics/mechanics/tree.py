@@ -73,7 +73,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
     arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
     E: Floats  # (phases, n, n) reductions; a body that follows others has zero on the diagonal
-    hinges: Integers  # (rows, 2) bodies at each hinge: its torque turns the first back and the second forward
+    hinges: Integers  # (rows, 2) bodies at each hinge; its resistance turns the first back and the second forward
     laws: Floats  # (rows, LAW_NUMBERS) parameters of the SpringDamper at each hinge
     push_off: float  # N s, impulse along the trailing leg: instantaneous, or a pulse that starts at the touch
     mass: float  # kg

@@ -26,7 +26,9 @@ REPEAT_DISTANCE = 1e-5  # points closer than this count as equal
 NEAR_REPEAT = 1e-3
 MAX_APPROACH_RATIO = 0.8
 GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
-MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # blocks per walk; length of a block in correlation times
+MAX_BLOCKS = 64  # per walk
+MIN_BLOCKS = 10
+BLOCK_LENGTH = 5.0  # in correlation times
 MAX_WALKS = 8  # walks per exponent
 # largest difference between the means of a walk's halves, in standard errors of the whole walk's mean; the standard
 # error of the difference is twice as large

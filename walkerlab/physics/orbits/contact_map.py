@@ -425,7 +425,8 @@ class ContactMap(StepMap):
         like: WalkerOnGround,
         first: int = 0,
     ) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units.
+        """Prepare a family's map. `walker_at` returns the walker at a parameter value, or None if it is invalid. Units
+        are those of `like`.
 
         first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
         """

@@ -13,7 +13,7 @@ import numpy as np
 
 from walkerlab.physics.solvers.system import Floats
 
-PRECISION = 1e-9  # change of the quantity at convergence, relative to its initial value
+PRECISION = 1e-9  # a search ends when the quantity changes by less than this, relative to its initial value
 MAX_DESIGN_ITERATIONS = 60
 BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer to a bound count as on it
 SAME_OPTIMUM = 1e-4  # searches that end closer than this fraction of the range found the same optimum

@@ -84,7 +84,9 @@ NO_GAIT = -2
 
 
 class StrikeSection(NamedTuple):
-    """States of a walker just after heel strike, y = start + z basis, with scaled-down variational columns."""
+    """Section of states just after heel strike, y = start + z basis. A state includes its variational columns, scaled
+    down.
+    """
 
     walker: Any  # records for compiled code, from `models_in_turn`
     start: Any  # (2 n (1 + d),) the state at z = 0, with its variational columns
@@ -175,7 +177,7 @@ class Steps(NamedTuple):
 
 
 class StepTangents(NamedTuple):
-    """Derivatives of a step by its start (m = 2 n values) and by the rise of its foothold."""
+    """Derivatives of a step with respect to its start (m = 2 n values) and to the rise of its foothold."""
 
     end: Floats  # (m,) state before the heel strike
     rates: Floats  # (times, 2) rates of swing and stance leg at the sample times
@@ -261,7 +263,7 @@ class RigidStepper(local):
     def differentiate(
         self, section: StrikeSection, start: Floats, floor: tuple[Floats, float], times: Floats
     ) -> StepTangents | None:
-        """Differentiate a step from a state (2 n,) by that state and the step's rise, or return None if the step fails.
+        """Differentiate a step with respect to its start (2 n,) and its foothold's rise. Return None if it fails.
 
         floor  rises (2,) and nearest landing, as in `HeelStrikes`
         times  of samples, from the start of the step
@@ -377,7 +379,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
 
 
 class RigidMap(StepMap):
-    """Step map of the rigid model in section coordinates of the similar walker of unit size."""
+    """Step map of the rigid model, in section coordinates of the walker scaled to unit size."""
 
     monitors = (
         Monitor("min_normal_force_N", "N", "minimum normal force on the stance foot", 0.0),

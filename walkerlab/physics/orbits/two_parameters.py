@@ -90,8 +90,8 @@ def follow_curve(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """Follow the curve through a bifurcation within both spans, up to `points` points each way, or None if
-    that fails.
+    """Follow the curve through a bifurcation within both spans, up to `points` points each way. Return None
+    if that fails.
     """
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)

@@ -31,7 +31,7 @@ DEPTH = 64  # maximum number of pieces on the stack
 
 @pass_by_reference
 class CrossingFinder(NamedTuple):
-    """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
+    """Work arrays and matrices for event functions sampled at `nodes` (fractions of a step)."""
 
     nodes: Any  # (degree + 1,)
     to_bernstein: Any  # (degree + 1, degree + 1) maps values at the nodes to Bernstein coefficients

@@ -43,7 +43,7 @@ class Planner:
         self._keys: dict[str, str] = {}
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide for each stage, assuming that all succeed. This changes no file."""
+        """Decide for each stage whether to run or reuse it, assuming that every run succeeds. No file changes."""
         steps = []
         for stage in self.stages:
             step = self.decide(stage)

@@ -33,8 +33,10 @@ class Keys:
         self._sources = Sources()
         self._digests: dict[tuple[str, ...], str] = {}
 
-    def compute(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all its inputs, by stage. Raises as `Graph.needed_in_memory` does."""
+    def compute_keys(self, config: Config, target: str) -> dict[str, str]:
+        """Return the keys of a stage and of all its inputs, by stage. Raises the same errors as
+        `Graph.needed_in_memory`.
+        """
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
             input_keys = {name: keys[name] for name in stage.inputs(config)}
@@ -73,7 +75,7 @@ def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     # If the word is the value of another key, the result depends on more code than necessary, which does no harm.
     used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}
     if stage.draws:
-        used |= {code for extension in extensions().values() for code in extension.views()}
+        used |= {code for extension in extensions().values() for code in extension.drawing_code()}
     return used
 
 

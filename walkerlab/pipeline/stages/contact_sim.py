@@ -19,7 +19,7 @@ from walkerlab.pipeline.stages.walk import (
     STRIDE,
     asymmetry_of,
     content_of_walk,
-    legs,
+    leg_labels,
     measure_pace,
     rigid_start,
     rotation_variables,
@@ -150,7 +150,7 @@ def trajectory_group(
     config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
     """Build the group of the sampled quantities that the config's `outputs` select."""
-    variables = {**variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
+    variables = {**variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **leg_labels()}
     feet = sample_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)

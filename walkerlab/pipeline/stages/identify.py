@@ -23,7 +23,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, MeasuredFile
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
-from walkerlab.pipeline.stages.walk import legs, variables_over_time
+from walkerlab.pipeline.stages.walk import leg_labels, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
 from walkerlab.scene.identification import LEGS, identify_walk
 from walkerlab.scene.parameter import SLOPE, config_with, parameter_of
@@ -292,7 +292,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
         bodies = np.zeros((rows.size, len(walker.arm_x)))
         bodies[:, :2] = reorder_by_leg(angle, stance)
         straight = np.array([apply_couplings(walker, STRAIGHT, row) for row in bodies])
-        variables = {**variables_over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **legs()}
+        variables = {**variables_over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **leg_labels()}
         variables |= place_variables(places(walker, (), footholds, straight, step), stance)
         groups[f"{name}_motion"] = Group(variables, about)
     return groups

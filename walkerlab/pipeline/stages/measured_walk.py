@@ -22,7 +22,7 @@ from walkerlab.exchange.columns import (
     refuse_units,
     unit_value,
 )
-from walkerlab.exchange.leg_angles import legs, mend_angles
+from walkerlab.exchange.leg_angles import mend_angles, read_leg_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, RecordedSteps, divide_into_steps, is_plausible, sum_over_level
@@ -80,9 +80,9 @@ class MeasuredFile:
         return divide_into_steps(self.walk, rigid_walker(config), self.block.data, touch_sum_rad)
 
     def divisions(self) -> Iterator[MeasuredWalk]:
-        """Yield the walk in steps. Angles may be divided in several ways.
+        """Yield the walk divided into steps.
 
-        They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
+        There is more than one division only if slope or sensor offset is estimated: heel strikes depend on both.
         Raises ConfigError for a file without a walk.
         """
         if self.steps is not None:
@@ -112,7 +112,7 @@ class MeasuredFile:
                 f"{self.path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk."
             )
         # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
-        angles = legs(self.walk)[:, ::-1] if steps.swapped else legs(self.walk)
+        angles = read_leg_angles(self.walk)[:, ::-1] if steps.swapped else read_leg_angles(self.walk)
         touches = np.append(0.0, steps.touch_time_s)
         measured = split_into_steps(self.walk.time_s - steps.origin_s, angles, touches, touch_sum_rad)
         return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
@@ -140,7 +140,7 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     yield 0.0
     if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
-    sums = sums_at_jumps(walk.time_s, legs(walk), partial(sum_over_level, rigid_walker(config)))
+    sums = sums_at_jumps(walk.time_s, read_leg_angles(walk), partial(sum_over_level, rigid_walker(config)))
     yield from (each for each in sums if each)
 
 

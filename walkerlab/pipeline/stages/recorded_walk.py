@@ -20,7 +20,7 @@ from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, f
 from walkerlab.outcome import Outcome
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import TIME_LABELS, legs, step_columns, variables_over_time
+from walkerlab.pipeline.stages.walk import TIME_LABELS, leg_labels, step_columns, variables_over_time
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
@@ -156,7 +156,7 @@ def content_of(
         "doubts": [*doubts],
     }
     return Content(
-        {"steps": Group(columns), "trajectory": Group({**variables_over_time(**samples), **legs()})}, summary
+        {"steps": Group(columns), "trajectory": Group({**variables_over_time(**samples), **leg_labels()})}, summary
     )
 
 

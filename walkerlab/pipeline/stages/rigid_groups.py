@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
 from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, compute_in_turns, energy_at_touch
-from walkerlab.pipeline.stages.walk import COORDINATE, legs, rotation_variables, steps_of, variables_over_time
+from walkerlab.pipeline.stages.walk import COORDINATE, leg_labels, rotation_variables, steps_of, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
 
@@ -37,7 +37,7 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
     heel strike.
     """
     stance = stance_leg(samples)
-    variables = {**variables_over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
+    variables = {**variables_over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **leg_labels()}
     if "states" in scene.outputs:
         variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)

@@ -129,7 +129,7 @@ def run(
         answer["gait_sensitivity_norm"] += [row for each in gaits for row in norms(row_of(subject, each), each)]
         rough_walks = [*rough_ground_units(subject, config)]
         label = f"robustness: {subject.model} model"
-        units = [*single(subject, config, len(gaits)), *rough_walks]
+        units = [*single_disturbance_units(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
         # The computation of the gait's quantities has already compiled all kernels.
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
@@ -217,7 +217,7 @@ def norms(beginning: Mapping[str, Any], gait: GaitOnMap) -> Iterator[dict[str, A
             }
 
 
-def single(subject: ModelUnderTest, config: RobustnessConfig, legs: int) -> Iterator[WorkUnit]:
+def single_disturbance_units(subject: ModelUnderTest, config: RobustnessConfig, legs: int) -> Iterator[WorkUnit]:
     """Yield the work units that search for the largest floor drop and hip push, each in both directions, by leg."""
     for leg in range(legs):
         for disturbance, sign in LARGEST.values():

@@ -144,7 +144,7 @@ REPEATED_AFTER_SETTLING = 1e-2
 ON_GAIT = 1e-6
 """A walk starts on a gait if its second step differs from the first by less than this (relative)."""
 OFF_GAIT = 1e-2
-"""A walk has left its gait at the first step that differs from the first one by more than this (relative)."""
+"""A walk has left its gait as soon as a step differs from step 1 by more than this (relative)."""
 STRIDE: Final = 2
 """Number of steps in a stride."""
 STEP = "step"
@@ -296,7 +296,7 @@ def rotation_variables(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict
     }
 
 
-def legs() -> dict[str, Variable]:
+def leg_labels() -> dict[str, Variable]:
     """Build the coordinate of the legs. Each leg keeps its number, 1 or 2, whether it swings or stands."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 

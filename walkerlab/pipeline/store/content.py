@@ -212,7 +212,7 @@ def check_text(*texts: str) -> None:
 def check_name(name: str) -> None:
     """Raise ValueError for a name that some readers of the file would reject."""
     if not NAME.fullmatch(name):
-        raise ValueError(f"not a name that can be stored: {name!r}")
+        raise ValueError(f"{name!r} is not a valid name for a group or variable")
 
 
 def plain(value: Any) -> Any:

@@ -79,10 +79,10 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
 
 def write_numbered(path: Path, text: str) -> Path:
-    """Write a text under a path or, if another text is there, under the next free `name-2`, `name-3`, ..., and return
-    it.
+    """Write a text to a path, and return the path.
 
-    A file that holds the same text is kept. Raises StorageError if the file cannot be written.
+    If the path holds another text, the next free `name-2`, `name-3`, ... is used. A file that holds the same text is
+    kept. Raises StorageError if the file cannot be written.
     """
     for number in itertools.count(1):
         place = path if number == 1 else path.with_stem(f"{path.stem}-{number}")

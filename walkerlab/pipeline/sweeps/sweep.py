@@ -139,7 +139,7 @@ class SweepRun:
         for index in range(len(self.question)):
             try:
                 keys.append(
-                    bytes.fromhex(self.keys.compute(self.config(index), self.question.stage)[self.question.stage])
+                    bytes.fromhex(self.keys.compute_keys(self.config(index), self.question.stage)[self.question.stage])
                 )
             except ConfigError as error:
                 prefix = f"at {self.question.describe_point(index)}: " if len(self.question.axes) > 1 else ""
@@ -258,7 +258,7 @@ class SweepRun:
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
-            key = self.keys.compute(config, stage)[stage]
+            key = self.keys.compute_keys(config, stage)[stage]
             yield WorkUnit(
                 key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced, versions())
             )
@@ -267,13 +267,13 @@ class SweepRun:
 def unread_keys(run: SweepRun) -> Iterator[str]:
     """Iterate over swept parameters that neither the stage nor its inputs read."""
     question = run.question
-    base = run.keys.compute(run.config(0), question.stage)
+    base = run.keys.compute_keys(run.config(0), question.stage)
     for number, axis in enumerate(question.axes):
         settings = question.settings(0)
         settings[number] = axis.setting(len(axis.values) - 1)
         if axis.values[-1] != axis.values[0]:
             with contextlib.suppress(ConfigError):  # this combination of values may be invalid
-                if run.keys.compute(run.loaded.variant(settings), question.stage) == base:
+                if run.keys.compute_keys(run.loaded.variant(settings), question.stage) == base:
                     yield axis.key
 
 

@@ -127,7 +127,7 @@ class Request:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """All changes of the config, as KEY=VALUE."""
+        """All changes to the config, as KEY=VALUE."""
         return (*(self.sets or ()), *self.own)
 
     def typed_for(self, command: str) -> str:

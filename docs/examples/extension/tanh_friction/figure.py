@@ -12,5 +12,9 @@ def draw(results):
     return figure, (abs(walk["friction_force_N"]).max(),)
 
 
-TEXTS = {"title": "Friction over slip", "caption": "Friction force (N) over slip (m/s); at most {:.0f} N."}
+TEXTS = {
+    "title": "Friction over slip",
+    "caption": "Friction force (N) over slip (m/s); at most {:.0f} N.",
+    "seen": "A dot for each sample: friction rises with the slip velocity and then stays constant.",
+}
 FIGURES = (Illustration("friction-over-slip", (WALK,), draw, texts=TEXTS),)

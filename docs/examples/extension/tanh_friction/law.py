@@ -9,7 +9,7 @@ from walkerlab.physics.ground.friction import friction_coefficient
 class Tanh(NamedTuple):
     """Parameters of the law, SI."""
 
-    largest: float  # [mu] coefficient at any slip
+    largest: float  # [mu] coefficient at high slip
     velocity: float  # [v_0] m/s
     rising_until: float  # m/s, slip velocity beyond which friction grows by less than half a per cent
     sliding_from: float  # m/s, slip velocity above which the coefficient is constant, to half a per cent
@@ -20,7 +20,7 @@ class Tanh(NamedTuple):
         return cls(contact.dynamic_friction, v, 3 * v, 3 * v)
 
     def scale_creep(self, factor):
-        return Tanh(self.largest, *(factor * v for v in self[1:]))
+        return Tanh(self.largest, factor * self.velocity, factor * self.rising_until, factor * self.sliding_from)
 
     def describe(self):
         return f"friction of {self.largest:g} tanh(v / {self.velocity:g} m/s)"

@@ -52,7 +52,7 @@ class WalkTask:
 
     def run(self) -> WalkAnswer:
         walk = EngineWalk(self)
-        walk.go()
+        walk.walk_to_end()
         rules = walk.rules
         walk_state = walk.rules.walk_state
         outcome = rules.outcome
@@ -82,7 +82,7 @@ class EngineWalk:
     def is_over(self) -> bool:
         return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
 
-    def go(self) -> None:
+    def walk_to_end(self) -> None:
         """Walk to the end. A step in which a knee locks or is released is repeated up to that instant."""
         rules = self.rules
         while rules.outcome is None and not self.is_over and self.steps < self.task.max_steps:
@@ -229,7 +229,9 @@ class TuningTask:
 
     @property
     def settling_s(self) -> float:
-        """Eight times the slower time constant of the ball, according to the target."""
+        """Time (s) after which the ball is taken to be at rest: eight times its slower time constant on the target
+        contact.
+        """
         ratio = self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
         return 8.0 / slow

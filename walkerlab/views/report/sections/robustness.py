@@ -93,12 +93,12 @@ def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
 def findings(summary: Mapping[str, Any]) -> list[str]:
     first: dict[str, Mapping[str, Any]] = {}
     for row in summary["sensitivity"]:
-        if row["of"] == NORM and row["to"].startswith(BUILDER_KEYS) and ranks(row):
+        if row["of"] == NORM and row["to"].startswith(BUILDER_KEYS) and can_be_ranked(row):
             first.setdefault(row["model"], row)
     return words.parts("robustness.findings", summary, [*first.values()])
 
 
-def ranks(row: Mapping[str, Any]) -> bool:
+def can_be_ranked(row: Mapping[str, Any]) -> bool:
     """Whether a derivative can be ranked by its relative effect."""
     return row.get("relative") is not None and not row.get("why")
 
@@ -113,7 +113,9 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     norms = summary["gait_sensitivity_norm"]
     legs_differ = any("leg" in row for row in norms)
     columns = (MODEL_COLUMN, *([LEG_COLUMN] if legs_differ else []), *NORM_COLUMNS)
-    ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # both models together
+    ranked = sorted(
+        (row for row in rows if can_be_ranked(row)), key=lambda row: -abs(row["relative"])
+    )  # both models together
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
