@@ -1,5 +1,6 @@
 """Workers that die, on this machine, on Dask and as jobs; what is left is there and the guilty point is told."""
 
+import contextlib
 import os
 import signal
 import stat
@@ -374,6 +375,15 @@ def test_unknown_or_uninstalled_sweep_engine_is_reported(monkeypatch):
     with pytest.raises(ConfigError) as caught, ENGINES["dask"].opened(EngineOptions()):
         pass
     assert caught.value.advice == "pip install 'walkerlab[dask]'"
+
+
+def test_option_of_a_slurm_job_may_be_a_decimal_number_and_is_refused_if_it_is_no_number(tmp_path):
+    for text in ("1.5", "abc"):
+        options = EngineOptions(folder=tmp_path, options={"cluster": "local", "mem_gb": text})
+        with contextlib.ExitStack() as stack:
+            if text == "abc":
+                stack.enter_context(pytest.raises(ConfigError, match="mem_gb"))
+            stack.enter_context(ENGINES["slurm"].opened(options))
 
 
 def test_chunk_size_follows_measured_times_and_shrinks_at_the_end():

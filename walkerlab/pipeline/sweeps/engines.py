@@ -4,6 +4,7 @@ import contextlib
 import functools
 import importlib
 import os
+import re
 import signal
 import subprocess
 import threading
@@ -156,8 +157,8 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", options)
-    # Options are texts, but submitit refuses counts that are texts.
-    parameters: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in options.options.items()}
+    # Options are texts, but submitit refuses numbers that are texts.
+    parameters: dict[str, Any] = {name: number_or_text(text) for name, text in options.options.items()}
     cluster = str(parameters.pop("cluster", "slurm"))
     python = parameters.pop("python", None)
     try:
@@ -165,7 +166,8 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
             private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
         )
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
-    except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
+    # It asserts the types of options.
+    except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
     submit = functools.partial(job_runner.submit, run_until_signalled)
@@ -178,6 +180,15 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
                 with contextlib.suppress(OSError):  # the job may have ended meanwhile
                     if not job.paths.result_pickle.exists():
                         job.cancel(check=False)
+
+
+def number_or_text(text: str) -> int | float | str:
+    """Return the whole or decimal number that a text holds, or the text itself.
+
+    >>> [number_or_text(text) for text in ("60", "1.5", "24:00:00")]
+    [60, 1.5, '24:00:00']
+    """
+    return int(text) if text.isdigit() else float(text) if re.fullmatch(r"\d+\.\d+", text) else text
 
 
 def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
