@@ -10,8 +10,8 @@ from engine_scenes import compass, kneed, limping, one_knee
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
 from walkerlab.evidence.benchmarks.engines.mujoco import model_xml, tune
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask, TuningTask, WalkTask, pinned_model
-from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.exchange.mjcf import inverse_weights
 from walkerlab.physics.ground.walker import BENT, LOCKED

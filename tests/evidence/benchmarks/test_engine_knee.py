@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
-from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES
 from walkerlab.exchange.planar import PINNED, planar_model
 from walkerlab.physics.mechanics.parts import Anchor
 from walkerlab.physics.mechanics.rigid import rigid_on_slope

@@ -85,11 +85,6 @@ def test_point_foot_next_to_a_round_one_is_refused_with_a_radius_that_works():
     assert [ball.ground_m for ball in scene.model.balls] == [0.0, 0.0]
 
 
-def test_engines_refuse_a_walker_with_one_knee_and_a_straight_leg():
-    with pytest.raises(ConfigError, match="both with a knee or both without"):
-        supported_scene(load(Path("one-knee"), ("contact={terrain: plane}",)).config, 0.3, (0.0,) * 6)
-
-
 @pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
 def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
     scene = kneed().lock_knees(np.array(doing, np.int8))

@@ -7,11 +7,11 @@ from synthetic_engines import ROWS, SWINGS, TUNING, content, row, truth
 
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
-from walkerlab.evidence.benchmarks import extension
+from walkerlab.evidence.benchmarks.engines import registry
 from walkerlab.evidence.benchmarks.engines import stage as engines
 from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene, TaskLost
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engine
 from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, supported_scene, three_digits
-from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES, Engine
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Silent
@@ -36,7 +36,7 @@ def test_without_engines_the_advice_is_to_install_the_extra(monkeypatch):
 
 def test_engine_version_changes_the_result_key(monkeypatch):
     config = load().config
-    monkeypatch.setattr(extension, "installed", lambda: (ABSENT,))
+    monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
     monkeypatch.setattr(Engine, "version", "1.0")
     before = Keys().identity(PIPELINE["engines"], config, {}).config_slice
     monkeypatch.setattr(Engine, "version", "1.1")
@@ -143,7 +143,7 @@ def test_converged_and_changing_periods_are_distinguished():
 def test_error_ratio_of_the_last_halving_is_reported():
     found = content().summary["convergence"]["compass"]["same-law"]
     assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
-    assert "divides the error by: mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]
+    assert "divides the error by mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]
 
 
 def test_stored_result_does_not_depend_on_run_times():

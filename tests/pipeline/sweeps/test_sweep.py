@@ -12,7 +12,7 @@ from late_imports import import_late
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks import extension
+from walkerlab.evidence.benchmarks.engines import registry
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.planner import Planner
 from walkerlab.pipeline.plan.results import FolderResults, Keys, MemoryResults
@@ -183,10 +183,10 @@ def test_point_has_the_key_of_its_single_run(name, tmp_path):
 
 def test_engine_version_changes_only_the_key_of_the_stage_engines(monkeypatch):
     config = load().config
-    monkeypatch.setattr(extension, "installed", lambda: (extension.Engine("absent", "absent"),))
+    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent"),))
     keys = []
     for version in ("1.0", "1.1"):
-        monkeypatch.setattr(extension.Engine, "version", version)
+        monkeypatch.setattr(registry.Engine, "version", version)
         keys.append(Keys().compute_keys(config, "engines"))
     assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
 

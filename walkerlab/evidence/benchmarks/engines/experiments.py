@@ -18,8 +18,8 @@ import numpy as np
 
 from walkerlab.evidence.benchmarks.engines import runs
 from walkerlab.evidence.benchmarks.engines.adapter import Integrator, OwnContact, Stepping
+from walkerlab.evidence.benchmarks.engines.registry import Engine
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.evidence.benchmarks.extension import Engine
 from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy

@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.evidence.benchmarks.engines.adapter import OwnContact, Simulation, Stepping
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower
-from walkerlab.evidence.benchmarks.extension import PHYSICS_ENGINES
+from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.exchange import planar
 from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome

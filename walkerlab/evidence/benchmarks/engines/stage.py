@@ -15,8 +15,8 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene, OwnProcess, TaskLost
+from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.evidence.benchmarks.extension import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.words import words
 from walkerlab.exchange.engine_scene import EngineScene, contact_target, engine_scene
 from walkerlab.exchange.planar import SMALLEST_BALL_M
