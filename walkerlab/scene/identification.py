@@ -17,7 +17,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
-from walkerlab.physics.estimation.judgement import LIMP, alternates, judge, measure_radius
+from walkerlab.physics.estimation.judgement import alternates, describe_limp, judge, measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
@@ -327,7 +327,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
         reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
-    elif second_leg and verdict[1][0].endswith(LIMP):
+    elif second_leg and verdict[0] == "misfit" and (describe_limp(steps) or describe_limp(best)):
         verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
     dof = max(1, best.data.residuals.size - best.u.size)
     gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)

@@ -309,7 +309,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
             yield from question.attempt(candidate, question.guess(candidate.walker, EXACT))
 
 
-class Fitted(NamedTuple):
+class FittedSize(NamedTuple):
     """Value of a parameter that brings gaits closest to the printed values."""
 
     value: float
@@ -321,7 +321,7 @@ class Fitted(NamedTuple):
 def fit(
     question: Question, walker_of: Callable[[float], PlainWalker | None], begin: float, near: float,
     limits: tuple[float, float] = (-math.inf, math.inf),
-) -> Fitted | None:  # fmt: skip
+) -> FittedSize | None:  # fmt: skip
     """Fit a parameter to the printed values by secants from a first value, or return None if that leads nowhere."""
     without = question.misses(walker_of(begin))
     result = None
@@ -336,7 +336,7 @@ def fit(
         if not limits[0] <= value <= limits[1]:
             return None
         left = float(np.abs(without + move * slope).max())
-        result = Fitted(value, abs(value / near - 1.0), float(np.abs(without).max()), left)
+        result = FittedSize(value, abs(value / near - 1.0), float(np.abs(without).max()), left)
         if result.change < CONVERGED:
             break
         near = value

@@ -23,8 +23,7 @@ OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
 # fraction of a quantity's size; the residual of a missed heel strike is far larger
 SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
-LIMP: Final = ": a limp"  # end of the reason for a misfit of odd and even steps
-NOTABLE_ALTERNATION: Final = 3.0  # the same difference that suggests legs that differ
+NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference that suggests a key of leg 2
 PHASE_BINS: Final = 20
 # fraction of the leg length; the floor of a laboratory is rough by about 0.001
 UNUSUALLY_ROUGH: Final = 0.003
@@ -81,22 +80,24 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
 
 def alternates(fitted: Fitted) -> bool:
     """Whether a quantity of odd and even steps differs from the model's, which a rough floor may explain, too."""
-    channels = fitted.data.residuals[: fitted.forecast.measured.count * len(fitted.forecast.channels)]
-    return any(
-        alternation_of(each) > NOTABLE_ALTERNATION for each in np.split(channels, len(fitted.forecast.channels) or 1)
-    )
+    return any(each > NOTABLE_ALTERNATION for each in alternations(fitted, fitted.data.residuals).values())
 
 
 def describe_limp(fitted: Fitted) -> str:
     """Describe by how much a quantity of odd and even steps differs from the model's, or return '' if it does not."""
     white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
-    steps = fitted.forecast.measured.count
-    for index, quantity in enumerate(fitted.forecast.channels):
-        alternation = alternation_of(white[index * steps : (index + 1) * steps])
+    for quantity, alternation in alternations(fitted, white).items():
         if alternation > ALTERNATION:
             name = name_and_unit(quantity)[0]
-            return f"the {name} alternates from step to step by {alternation:.2g} standard deviations{LIMP}"
+            return f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
     return ""
+
+
+def alternations(fitted: Fitted, residuals: Floats) -> dict[str, float]:
+    """Return the difference between odd and even steps of each quantity of a step, in standard deviations."""
+    steps = fitted.forecast.measured.count
+    channels = enumerate(fitted.forecast.channels)
+    return {quantity: alternation_of(residuals[index * steps : (index + 1) * steps]) for index, quantity in channels}
 
 
 def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
