@@ -214,14 +214,14 @@ def stiff_ground_trial(config: ContactConfig, state: State, length_m: float, ste
 TAYLOR_METHOD = "heyoka-taylor"
 
 
-def is_installed() -> bool:
+def has_heyoka() -> bool:
     return importlib.util.find_spec("heyoka") is not None
 
 
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
     """Return the state after `steps` heel strikes, or None if one of them does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
-    passing, striking = integrators(walker)
+    passing, striking = taylor_integrators(walker)
     state = np.array(start)
     for _ in range(steps):
         # Both feet are also on the slope at the start, so the search for the heel strike begins when the legs have
@@ -238,7 +238,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
     return state
 
 
-def integrators(walker: RigidWalker) -> tuple[Any, Any]:
+def taylor_integrators(walker: RigidWalker) -> tuple[Any, Any]:
     """Build two Taylor integrators of the swing phase: one stops when the legs pass, the other at heel strike."""
     import heyoka as hy
 
@@ -346,7 +346,7 @@ def second_end(trial: Trial) -> End:
 
 def compass_of(trial: Trial) -> RigidWalker | None:
     """Return the Appendix A walker of a rigid trial, or None if the trial has no compass or heyoka is not installed."""
-    return trial.compass if isinstance(trial, RigidTrial) and is_installed() else None
+    return trial.compass if isinstance(trial, RigidTrial) and has_heyoka() else None
 
 
 def tightest_end(trial: Trial, method: str) -> End:
