@@ -1,5 +1,6 @@
-"""Measurements to compare with the printed numbers: both sets of rigid equations, the contact model, and the differences
-of a config's scene from the paper's. If there are any, its numbers neither confirm nor refute the paper's.
+"""Measurements to compare with the printed numbers: both sets of rigid equations, and the contact model.
+
+If a config's scene departs from the paper's, its numbers neither confirm nor refute the paper's.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
