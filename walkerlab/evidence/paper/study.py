@@ -4,7 +4,6 @@ Some measurements follow Appendix A's misprints. Their heel strike solves the si
 """
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated
@@ -13,8 +12,8 @@ import numpy as np
 from scipy.optimize import root
 
 from walkerlab.evidence.paper import measured, printed
-from walkerlab.evidence.paper.adams_start import AdamsStart, adams_start
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled, swing_constants
+from walkerlab.evidence.paper.measured import AdamsStart, adams_start
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.labels import Label
 from walkerlab.physics.hybrid.comparison import Array
@@ -206,11 +205,8 @@ class Erratum:
     measured: Annotated[str, Label("", "values from this run")]
 
 
-ERRATUM_PARTS = [field.name for field in fields(Erratum)]
-ERRATUM_PATTERN = re.compile(" ".join(rf"{name}: (?P<{name}>.*?)" for name in ERRATUM_PARTS) + r"(?= where: |$)")
-"""Matches an erratum in the rendered template."""
-
-
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
     """Return all errata, by theme and then in the order of the paper's sections."""
-    return tuple(Erratum(**match.groupdict()) for match in ERRATUM_PATTERN.finditer(prose("errata.errata", study)))
+    texts = [text.partition(": ")[2] for text in prose.parts("errata.errata", study)]
+    length = len(fields(Erratum))
+    return tuple(Erratum(*texts[first : first + length]) for first in range(0, len(texts), length))

@@ -9,8 +9,8 @@ import numpy as np
 
 from walkerlab.config.reads import ContactConfig, TuneConfig
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
-from walkerlab.evidence.paper.adams_start import AdamsWalk, adams_walk
 from walkerlab.evidence.paper.law import is_own_walker
+from walkerlab.evidence.paper.measured import AdamsWalk, adams_walk
 from walkerlab.evidence.paper.omissions import adjustment_omissions
 from walkerlab.evidence.paper.printed import LARGEST_ERROR, TABLE_2
 from walkerlab.labels import Label

@@ -233,16 +233,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepare_start(config, case)
     if start is None:
-        return CaseResult(
-            *about,
-            outcome=Outcome.REJECTED.label,
-            steps=0,
-            energy_balance_residual_J=0.0,
-            rhs_evaluations=0,
-            wall_s=0.0,
-            findings=(),
-            second_tried="no start exists",
-        )
+        return CaseResult(*about, outcome=Outcome.REJECTED.label, second_tried="no start exists")
     methods = case_tolerances(start, case)
     began = time.perf_counter()
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
