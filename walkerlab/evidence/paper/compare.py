@@ -222,7 +222,10 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Simulate up to 20 steps from a gait with each knee release.
+    """Simulate up to 20 steps from a gait with each moment of the trailing knee's release.
+
+    Each walk is compared with the corresponding rigid model, in which a knee released during compression is rigid in
+    the impact, and a knee released at first touch is free.
 
     Returns None for walkers without knees, with a push-off or with legs that differ.
     """
