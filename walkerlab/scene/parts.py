@@ -177,7 +177,7 @@ def drive_parameters(config: RigidConfig) -> Drives:
     dampings = knee_dampings(config.walker)
     # a knee is only damped
     knees = tuple((0.0, damping, 0.0) for damping in dampings) if any(dampings) else ()
-    return Drives(tuple(dict(config.walker.hip).values()), push_offs(config.push_off), knees)
+    return Drives(config.walker.hip.parameters, push_offs(config.push_off), knees)
 
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:

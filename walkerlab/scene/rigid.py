@@ -21,6 +21,7 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pa
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene import parts
+from walkerlab.scene.laws import law_class
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
@@ -100,9 +101,10 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
     Raises ConfigError if the parts are not a valid walker.
     """
+    law = law_class("hinge_law", walker.hip.law)
     try:
         return rigid_on_level_ground(
-            parts.assembly_of(walker, rigid=True), gravity, parts.knee_locked_at_strike(walker)
+            parts.assembly_of(walker, rigid=True), gravity, parts.knee_locked_at_strike(walker), law
         )
     except ValueError as error:
         raise ConfigError(f"walker: {error}", parts.PARTS_DOCS) from None
