@@ -17,7 +17,7 @@ from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.resting import RestingFoot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
-from walkerlab.physics.ground.walker import ContactWalker, changed_forms, floating_state
+from walkerlab.physics.ground.walker import floating_state
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround
 from walkerlab.physics.mechanics.parts import Assembly
@@ -80,8 +80,8 @@ def contact_scene(
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
     hinge_law = law_class("hinge_law", config.walker.hip.law)
-    passive = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, hinge_law=hinge_law)
-    walker = apply_drives(passive, config)
+    drives = contact_drives(config)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, hinge_law=hinge_law, drives=drives)
     leg = config.walker.leg_length_m
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -119,11 +119,12 @@ def scene_on_pads(
     return contact_scene(config, rigid_step, pitch, asymmetry)
 
 
-def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
+def contact_drives(config: ContactConfig) -> dict[str, Any]:
+    """Return the fields of the contact model that hold the torques at hinges and the push-offs of a config."""
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
-    return changed_forms(walker, **drives.shared, **(pulse if any(drives.push_offs) else {}), **knees)
+    return drives.shared | (pulse if any(drives.push_offs) else {}) | knees
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:

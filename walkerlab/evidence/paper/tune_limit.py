@@ -30,7 +30,7 @@ from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.store.content import Group, columns, rows_group, values_by_column
-from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, apply_drives, knee_rules, start_state
+from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, contact_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 
 SAMPLING_FACTOR = 4  # factor on contact-sim's sampling rate; keeps interpolation errors far below the model error
@@ -123,8 +123,8 @@ def limit_findings(
             points = config.walker.model_copy(update={"foot_radius_m": 0.0})
             rules = knee_rules(config.walker)
             laws = walker.normal, walker.friction
-            walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
-            walker = apply_drives(walker, config)
+            ground = config.gravity_m_s2, config.slope_rad
+            walker = contact_walker(assembly_of(points), *laws, *ground, rules, drives=contact_drives(config))
         series[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:

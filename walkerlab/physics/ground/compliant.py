@@ -1,7 +1,9 @@
 """Assembly of a walker on compliant ground from its parts."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,8 @@ from walkerlab.physics.ground.walker import FIRST_KNEE, FORM_SHAPES, MAX_BODIES,
 from walkerlab.physics.mechanics import parts, tree
 from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper
 from walkerlab.physics.solvers.system import Floats
+
+NO_DRIVES: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,11 @@ def contact_walker(
     knee_rules: KneeRules | None = None,
     pinned_foot: int = STANCE_FOOT,
     hinge_law: type[SpringDamper] = SpringDamper,
+    drives: Mapping[str, Any] = NO_DRIVES,
 ) -> ContactWalker:
     """Assemble a walker on compliant ground (gravity in m/s^2, slope in rad). Foot k and knee k belong to leg k.
+
+    drives  fields of all forms for torques at hinges and push-offs, as in `tree.write_fields`
 
     In the pinned forms, the hinge is the centre of the ball of `pinned_foot`, at position 0 along the slope. Raises
     ValueError, with a message for the user, if the parts cannot walk on compliant ground.
@@ -64,6 +71,7 @@ def contact_walker(
     legs = parts.leg_bodies(assembly)
     # Merging bodies renumbers them, so the hip's two bodies are looked up in each form.
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
+    tree.write_fields(forms, drives)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
