@@ -67,7 +67,7 @@ from walkerlab.pipeline.store.content import (
     values_by_column,
 )
 from walkerlab.scene import contact
-from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, apply_drives, knee_rules, start_state
+from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, contact_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
@@ -163,8 +163,8 @@ def limit_findings(
             points = config.walker.model_copy(update={"foot_radius_m": 0.0})
             rules = knee_rules(config.walker)
             laws = walker.normal, walker.friction
-            walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
-            walker = apply_drives(walker, config)
+            ground = config.gravity_m_s2, config.slope_rad
+            walker = contact_walker(assembly_of(points), *laws, *ground, rules, drives=contact_drives(config))
         series[name] = limit.series(name, walker, gait, start)
         progress.advance()
     for name in gaits:
