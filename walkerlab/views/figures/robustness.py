@@ -177,18 +177,11 @@ def draw_shares(axes: Axes, steps: Group) -> None:
     axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
 
 
-FIGURE_18 = paper_figure(
-    18,
-    (
-        Need(
-            ROBUSTNESS_STAGE,
-            "rough_walk/trajectory",
-            ("hip_along_m", "foot_along_m"),
-            "no walk on rough ground was requested",
-        ),
-        Need(ROBUSTNESS_STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
-        Need(ROBUSTNESS_STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
-    ),
-    plot_rough_ground,
+NO_ROUGH_WALK = "no walk on rough ground was requested"
+ROUGH_NEEDS = (
+    Need(ROBUSTNESS_STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), NO_ROUGH_WALK),
+    Need(ROBUSTNESS_STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
+    Need(ROBUSTNESS_STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
 )
+FIGURE_18 = paper_figure(18, ROUGH_NEEDS, plot_rough_ground)
 FIGURES: Final[tuple[Any, ...]] = (FIGURE_18,)
