@@ -576,14 +576,12 @@ def map_group(tune: TuneRun) -> Group:
     factors = tune.gait_factors
     if factors is not None:
         attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
-    return Group(
-        {
-            swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
-            stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
-            **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
-        },
-        attrs,
-    )
+    variables = {
+        swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
+        stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
+        **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
+    }
+    return Group(variables, attrs)
 
 
 def gait_group(gait: Cycle, scene: contact.ContactScene) -> Group:
@@ -591,12 +589,11 @@ def gait_group(gait: Cycle, scene: contact.ContactScene) -> Group:
     names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
     units = ", ".join(unit for _, unit in coordinates)
     pairs = ("coordinate", "along")
-    return Group(
-        {
-            "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
-            "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
-            "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
-            **numbered(gait.z.size, "multiplier", "number"),
-            **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
-        }
-    )
+    variables = {
+        "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
+        "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
+        "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+        **numbered(gait.z.size, "multiplier", "number"),
+        **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
+    }
+    return Group(variables)
