@@ -226,9 +226,8 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
-        model = rigid_on_slope(
-            assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch
-        )
+        parts = assembly_of(config.walker, rigid=True)
+        model = rigid_on_slope(parts, config.gravity_m_s2, config.slope_rad, not at_touch)
         rigid = take_walk(add_drives(model, config), RIGID_TOLERANCES, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
@@ -301,10 +300,8 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
         row["recorded"] = recorded["recorded"]["table3"]["recorded"][symbol]
-    omissions = [*summary.pop("left_out"), *motion.left_out]
-    return Content(
-        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": omissions}
-    )
+    summary |= shared | recorded | {"left_out": [*summary.pop("left_out"), *motion.left_out]}
+    return Content({**groups, **motion.groups, **recorded_groups}, summary)
 
 
 def compare_with_paper(

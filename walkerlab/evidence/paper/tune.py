@@ -308,10 +308,9 @@ class TuneRun:
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*UNCHANGED_START)
         quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
-        rows = map_in_order(
-            [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs
-        )
-        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        rows = [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance]
+        computed = map_in_order(rows, jobs)
+        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, computed, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)

@@ -240,9 +240,8 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()
-        print_error(
-            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
-        )
+        lost = f"the output could not be written: {error.strerror}."
+        print_error(StorageError(lost, "The results themselves are stored."))
         raise typer.Exit(StorageError.exit_code) from None
 
 

@@ -141,9 +141,8 @@ def plot_rough_ground(results: Results) -> Drawn:
     figure = blank(1.6 + 2.0 * LOWER_PANEL_INCHES)
     tall = (figure.get_figwidth() - AXIS_LABEL_INCHES) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
-    walk, heights, share = figure.subplots(
-        3, 1, height_ratios=[tall, 0.7 * LOWER_PANEL_INCHES, 1.3 * LOWER_PANEL_INCHES]
-    )
+    ratios = [tall, 0.7 * LOWER_PANEL_INCHES, 1.3 * LOWER_PANEL_INCHES]
+    walk, heights, share = figure.subplots(3, 1, height_ratios=ratios)
     walk.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="height (m)")
     heights.sharex(walk)
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
