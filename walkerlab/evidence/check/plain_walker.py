@@ -442,7 +442,7 @@ def why_not_plain(config: RigidConfig) -> str:
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
-    return "" if config.walker.hip.law == LINEAR else "the plain model has no hinge laws of extensions"
+    return "" if config.walker.hip.hinge_law == LINEAR else "the plain model has no hinge laws of extensions"
 
 
 def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
