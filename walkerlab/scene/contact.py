@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 class LawKind(NamedTuple):
-    """Laws between which a key of the contact block chooses."""
+    """Force laws that a key of the contact block can select."""
 
     laws: dict[str, Any]  # classes by word
     protocol: type
