@@ -285,7 +285,7 @@ def test_page_for_newcomers_has_a_picture(page):
     assert re.search(r"^!\[[^]]+\]\(images/", text_of(ROOT / "docs" / f"{page}.md"), re.MULTILINE)
 
 
-def test_pictures_contain_the_labels_drawn_today(tmp_path):
+def test_pictures_in_the_docs_have_the_labels_that_the_code_draws(tmp_path):
     assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
 
 
@@ -299,7 +299,7 @@ def test_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     assert list(MAKER["stale_pictures"](tmp_path / "runs")) == [tmp_path / "images" / "figure-06.png"]
 
 
-def test_words_of_a_picture_contain_no_numbers():
+def test_stored_labels_of_a_picture_contain_no_numbers():
     words_of = MAKER["stale_pictures"].__globals__["words_of"]
     svg = "<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>"
     assert words_of(svg) == "slope (rad)\nstep #\n"

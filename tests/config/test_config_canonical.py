@@ -81,7 +81,7 @@ def test_config_slice_of_a_stage_does_not_depend_on_imported_modules(stage: Stag
     assert stage.reads(CONFIG) == KEYS[stage.name]
 
 
-def test_type_has_the_keys_of_its_bases() -> None:
+def test_config_type_has_the_keys_of_its_base_types() -> None:
     keys = ("walker", "gravity_m_s2", "slope_rad", "push_off", "equations", "contact", "start")
     assert tuple(dotted_keys(SceneConfig)) == keys
     assert tuple(slice_of(CONFIG, SceneConfig)) == keys

@@ -147,7 +147,7 @@ def test_bad_setting_is_rejected_with_its_position(refused: Refused, setting: st
     assert re.search(expected, refused("contact: {units: si}\n", sets=[setting]))
 
 
-def test_settings_do_not_modify_the_original_config() -> None:
+def test_settings_leave_the_original_config_unchanged() -> None:
     """Also those within a block that an earlier setting brought."""
     tree = load(None).tree
     damping, stiffness = (parse_setting(f"contact.{text}") for text in ("damping=7", "stiffness=8"))

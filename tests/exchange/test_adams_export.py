@@ -209,7 +209,7 @@ def test_view_script_has_the_commands_of_the_command_file():
     }
 
 
-def test_no_constraint_is_redundant():
+def test_exported_adams_model_has_no_redundant_constraint():
     assert dataset_of("functions", "paper").degrees_of_freedom() == 4
     torso = dataset_of("functions", "torso", PADS)
     assert torso.degrees_of_freedom() == 4
@@ -315,7 +315,7 @@ def test_uneven_pads_are_exported_as_boxes():
     assert [tops[f"pad_{number}"] for number in range(1, 7)] == pytest.approx([0.0, 0.0, 0.0, 1.0, -2.0, -2.0])
 
 
-def test_view_commands_build_the_same_objects():
+def test_commands_for_adams_view_build_the_same_objects():
     walker = ("torso", PADS, "walker.hip.spring_N_m_per_rad=1")
     for law in ("contact", "functions"):
         dataset = dataset_of(law, *walker)

@@ -31,7 +31,7 @@ def test_error_bar_of_a_strike_just_after_the_start_holds(tmp_path):
         assert max(each.errors[0] for each in counts) < 5.0
 
 
-def test_a_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
+def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
     """The sample changed sides in each fit, so that the strike never came to rest."""
     crops = campaign()
     crop = crops.Crop(0.62168034, 4.26921954, 25.0, 1.75e-4, -1.0)

@@ -145,7 +145,7 @@ def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_gap_is_left_out_of_a_used_column(tmp_path):
+def test_sample_missing_from_a_used_column_is_omitted(tmp_path):
     places = markers()
     text = marker_file(TIMES, places).replace(repr(float(places[2, 2, 0])), "")
     recording = read_recording(written(tmp_path, "walk.trc", text))

@@ -88,5 +88,5 @@ def test_option_force_restarts_the_campaign(toy, monkeypatch):
     assert (toy.runs / "paper" / "census.parts").read_bytes().count(b"\n") == 1 + 2
 
 
-def test_preview_lists_the_campaign(toy):
+def test_dry_run_lists_the_campaign(toy):
     assert actions(toy.preview("survey", full=True)) == {"survey": "run", "census": "run"}

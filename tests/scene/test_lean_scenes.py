@@ -97,7 +97,7 @@ def test_point_foot_is_a_ball_of_radius_zero(state):
 
 
 @given(state=states, clearance=st.floats(1e-9, 0.5))
-def test_foot_in_the_air_moves_as_without_ground(state, clearance):
+def test_foot_in_the_air_moves_as_if_there_were_no_ground(state, clearance):
     walker = walker_with()
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)

@@ -58,14 +58,14 @@ def test_energy_drift_is_bounded_by_the_swing_error(engine):
         assert drift < 25.0 * error + 1e-12, name
 
 
-def test_ball_rests_at_the_depth_of_the_law(engine):
+def test_ball_rests_at_the_depth_given_by_the_contact_law(engine):
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         assert task.penetration_at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
 
 
-def test_block_creeps_and_slides_according_to_the_law(engine):
+def test_block_creeps_and_slides_according_to_the_friction_law(engine):
     """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:

@@ -57,7 +57,7 @@ def test_walks_with_bouncing_feet_agree_with_an_independent_integration(campaign
     assert max(one.residuals) < 0.1 * campaign.BALANCED
 
 
-def test_short_campaign_covers_every_ground(campaign):
+def test_short_campaign_covers_every_kind_of_ground(campaign):
     grounds = {campaign.both(seed).ground for seed in SEEDS}
     assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds
     assert any(ground.startswith("kneed") and ground.endswith("pinned") for ground in grounds)

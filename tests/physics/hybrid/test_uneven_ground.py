@@ -90,7 +90,7 @@ def test_landing_less_than_a_quarter_step_ahead_is_not_a_step(name, share, seed)
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
 
 
-def test_walk_on_even_ground_has_no_shortest_landing():
+def test_minimum_landing_distance_does_not_affect_a_walk_on_even_ground():
     _, walker, gait = gait_of("slope-3deg")
     even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
     np.testing.assert_array_equal(even.after, judged.after)
@@ -136,7 +136,7 @@ def test_feet_land_at_the_heights_of_their_footholds():
     np.testing.assert_array_equal(walk.foothold_height_m, heights[1:])
 
 
-def test_heights_of_zero_change_no_bit():
+def test_foothold_heights_of_zero_change_no_bit_of_a_rigid_walk():
     _, walker, gait = gait_of("kneed")
     even, level = (take_walk(walker, TIGHT, gait.state, 3, heights=heights) for heights in (None, np.zeros(4)))
     np.testing.assert_array_equal(even.after, level.after)
@@ -181,7 +181,7 @@ def test_contact_walk_over_heights_balances_energy_and_stays_near_the_rigid_one(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_zero_heights_equal_even_ground_bit_for_bit(case):
+def test_contact_walk_over_heights_of_zero_equals_even_ground_bit_for_bit(case):
     name, terrain = CASES[case]
     _, even = on_terrain(name, terrain, None, steps=3)
     _, level = on_terrain(name, terrain, np.zeros(1), steps=3)

@@ -249,7 +249,7 @@ def test_mirrored_walker_moves_as_the_mirror_image(assembly, slope, free):
 
 
 @for_each_type
-def test_scaled_twin_takes_the_same_steps(assembly, slope, free):
+def test_scaled_copy_of_a_walker_takes_the_same_steps(assembly, slope, free):
     long, heavy = 3.7, 0.2
     model = rigid_on_slope(assembly, G, slope)
     twin = rigid_on_slope(

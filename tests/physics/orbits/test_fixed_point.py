@@ -366,7 +366,7 @@ def test_gaits_of_random_walkers_are_periodic(fraction, hip, inertia, degrees, s
         assert np.abs(step.z[0] - z).max() < 1e-11 * np.sqrt(9.81)
 
 
-def test_newton_gives_up_if_no_step_is_taken():
+def test_newton_gives_up_if_the_walker_completes_no_step():
     map_ = shooting(PAPER)
     found = solve(map_, PAPER, [0.17, 3.0, 3.0], 1e-12)
     assert isinstance(found, NotConverged)

@@ -291,7 +291,7 @@ def test_gravity_only_rescales_time():
     assert of_itself["gait_sensitivity_norm"] == pytest.approx(-0.5, abs=1e-6)
 
 
-def test_difference_quotient_is_of_fourth_order_and_one_sided_at_a_wall():
+def test_difference_quotient_has_order_four_and_is_one_sided_at_a_bound():
     for wall in (-np.inf, -1e-12):
         off = [
             derivative(lambda x, wall=wall: np.array([math.exp(x)]) if x > wall else None, h)[0] - 1.0

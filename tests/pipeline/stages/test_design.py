@@ -181,7 +181,7 @@ def test_contact_cost_of_transport_is_ground_loss_per_weight_and_distance(name):
     assert cost == pytest.approx(step.dissipated_J.sum() / (20.0 * 9.81 * step.length_m), rel=1e-7)
 
 
-def test_settled_kneed_walk_costs_as_much_as_its_gait():
+def test_settled_kneed_walk_has_the_cost_of_transport_of_its_gait():
     config, gait, _, cost = contact_gait("kneed-level")
     scene, costs, ways = contact_scene(config, gait.step_length), [], []
     for steps in (14, 15):

@@ -37,7 +37,7 @@ def drawn(made, group):
 
 
 @pytest.mark.parametrize(("slopes", "masses"), [(9, 3), (3, 9)])
-def test_parameter_with_few_values_becomes_lines(slopes, masses):
+def test_each_value_of_a_parameter_with_few_values_becomes_a_line(slopes, masses):
     group = swept(slopes, masses)
     figure = drawn(lines, group)
     curves = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
