@@ -136,7 +136,7 @@ for name in starts:
 
 @pytest.fixture(scope="module")
 def imported():
-    """What importing each of the starts loads, in a process of its own that has none but other people's libraries."""
+    """Return the modules that importing each start loads, in a process that has only third-party libraries."""
     asked = f"{' '.join(LIBRARIES)}\n{' '.join(STARTS)}\n"
     # a library's threads do not come along
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

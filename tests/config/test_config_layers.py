@@ -148,7 +148,7 @@ def test_bad_setting_is_rejected_with_its_position(refused: Refused, setting: st
 
 
 def test_settings_leave_the_original_config_unchanged() -> None:
-    """Also those within a block that an earlier setting brought."""
+    """This includes settings within a block that an earlier setting added."""
     tree = load(None).tree
     damping, stiffness = (parse_setting(f"contact.{text}") for text in ("damping=7", "stiffness=8"))
     block = parse_setting("contact={damping: 3, stiffness: 4}")

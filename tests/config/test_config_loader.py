@@ -64,7 +64,7 @@ print(*sorted(loaded - set(sys.stdlib_module_names)))
 
 
 def packages_loaded_by(statements: str) -> set[str]:
-    """The packages beyond the standard library that statements import, in a process of their own."""
+    """Return the packages beyond the standard library that some statements import in a process of their own."""
     command = [sys.executable, "-c", PACKAGES_LOADED.format(statements)]
     return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split())
 

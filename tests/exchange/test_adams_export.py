@@ -58,7 +58,7 @@ def without_forces(dataset):
 
 
 def directions(dataset, q):
-    """(parts' velocities, tree's velocities): how the parts move as the tree does."""
+    """Return (velocities of parts, velocities of the tree): how the parts move as the tree does."""
     return np.column_stack([hung(dataset, q, unit)[1] for unit in np.eye(q.size)])
 
 
@@ -135,7 +135,7 @@ def test_exported_model_reproduces_the_walk(seed):
 
 @pytest.mark.parametrize("walker", LIMPING[:3], ids=lambda walker: walker[0])
 def test_exported_model_of_legs_that_differ_reproduces_the_walk(walker):
-    """The fourth kind has knees: see below."""
+    """The fourth kind has knees and is tested below."""
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     assert export.walk.steps == 4
     expected = np.array(export.touches_s[:3])
@@ -161,7 +161,7 @@ def test_pads_of_legs_that_differ_lie_under_their_footholds():
 
 @pytest.mark.parametrize("walker", [LIMPING[3], ONE_KNEE], ids=["two knees", "one knee"])
 def test_commands_switch_the_knees_of_different_legs(walker):
-    """Their knees are damped, too."""
+    """The knees have dampers as well."""
     touches, locks, walk = run_kneed(*walker)
     assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)
     strikes = walk.knee_strike_time_s

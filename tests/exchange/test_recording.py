@@ -67,7 +67,7 @@ def markers():
 
 
 def with_column(text, name, cells):
-    """A table with one more column."""
+    """Return a table with one more column."""
     return "\n".join(f"{line},{cell}" for line, cell in zip(text.splitlines(), [name, *cells], strict=True))
 
 
@@ -97,7 +97,7 @@ def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
 
 
 def test_unit_of_one_component_applies_to_it_alone(tmp_path):
-    """Also where that component is the time."""
+    """That component may be the time."""
     text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
     walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), Recorded())
     assert walk.time_s == pytest.approx(TIMES / 1000.0, abs=1e-12)

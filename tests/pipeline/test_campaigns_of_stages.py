@@ -17,7 +17,7 @@ def states(toy, *sets):
 
 
 def cut_off(toy, monkeypatch, after, **options):
-    """A run of the census that is interrupted after so many stones."""
+    """Run the census, and interrupt it after some stones."""
     monkeypatch.setenv("TOY_STONES", str(after))
     with pytest.raises(KeyboardInterrupt):
         toy.execute("census", **options)

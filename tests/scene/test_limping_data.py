@@ -42,7 +42,7 @@ def measured(heavier, level, seed=1):
 
 
 def begun(walk, leg, stated=None):
-    """Twenty steps of a walk from its first step with this leg on; `stated` is what the data say about the leg."""
+    """Return twenty steps of a walk that begins with this leg. `stated` is what the data say about the leg."""
     part = slice(leg - 1, leg + 19)
     return MeasuredWalk(walk.periods_s[part], walk.lengths_m[part], first_leg=stated)
 

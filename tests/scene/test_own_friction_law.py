@@ -56,7 +56,7 @@ class Regularised(NamedTuple):
 
 @pytest.fixture
 def own(monkeypatch):
-    """The paper's walker on ground with that law."""
+    """Return the paper's walker on ground with that law."""
     monkeypatch.setitem(
         friction.friction_coefficient._bodies,
         Regularised,
@@ -67,7 +67,7 @@ def own(monkeypatch):
 
 
 class Wordless(NamedTuple):
-    """A law of which half is left out."""
+    """A law with half of its parts missing."""
 
     mu: float
 

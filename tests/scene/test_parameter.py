@@ -39,7 +39,7 @@ def config(request):
 
 
 def numbers_of(config, second_leg=False):
-    """The keys of the config's own walker that hold a number in it, or in its first leg."""
+    """Return the keys of the config's walker whose values, in it or in its first leg, are numbers."""
     for path, field in leaves(Config, held=config):
         held = config
         for name in path:

@@ -30,7 +30,7 @@ def scene(request):
 
 
 def our_samples(scene, interval_s, steps):
-    """Our own walk, as an engine with steps of `interval_s` would give it."""
+    """Return our own walk, sampled as an engine with steps of `interval_s` would."""
     result = simulate(scene, "radau5", 1e-9, steps, interval_s)
     return result, result.samples
 
@@ -99,7 +99,9 @@ def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
 
 
 def knees_seen(scene):
-    """Our own walk of two steps, what the rules remember of it, and when knees change: time, places before, after."""
+    """Return our own walk of two steps, the rules' record of it, and the changes of knees: time, places before and
+    after.
+    """
     result, samples = our_samples(scene, 1e-4, 2)
     rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
@@ -149,7 +151,7 @@ DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.h
 
 
 def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
-    """In the twentieth of a second after the first touch."""
+    """Compare over a twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
     result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)

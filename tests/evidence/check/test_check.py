@@ -167,7 +167,7 @@ def test_multiplier_of_minus_one_is_explained_by_a_start_on_the_heel_strike():
 
 
 def printed_with(origin, second, unit, order, positive):
-    """The compass's gait in some conventions, computed from its state by hand."""
+    """Return the compass's gait in some conventions, computed from its state by hand."""
     swing, stance, dswing, dstance = walkerlab.find_gait().state
     tilt = 0.0174 if origin == "slope-normal" else 0.0
     angles = {"swing": (swing + tilt, dswing), "stance": (stance + tilt, dstance)}

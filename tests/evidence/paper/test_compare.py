@@ -40,7 +40,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def gaits(study):
-    """A result of fixedpoint, as far as others read it."""
+    """A result of fixedpoint with the parts that other stages read."""
 
     def entry(name, model):
         return {
@@ -91,7 +91,7 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
 
 @pytest.fixture(scope="module")
 def compared(gaits):
-    """Compare with a contact walk of so many steps, with parts of its record left out."""
+    """Compare with a contact walk of some steps, leaving out parts of its record."""
 
     def result(*sets, steps=10, leave_out=(), outcome="walked", samples=None, fixedpoint=gaits):
         config = load(None, sets).config

@@ -39,7 +39,7 @@ def cases_of(config, gait=GAIT):
 
 
 def start_of(config):
-    """Legs apart on the slope, knees straight and the torso on the bisector, moving."""
+    """Return a moving start: legs apart on the slope, knees straight and the torso on the bisector."""
     model = rigid_walker(config, "corrected")
     bodies = len(model.zero_state) // 2
     stance = 0.2

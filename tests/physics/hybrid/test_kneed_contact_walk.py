@@ -44,7 +44,7 @@ BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
 
 
 def exchanged(walk):
-    """Energy that the ground and the knees took (J)."""
+    """Return the energy (J) that the ground and the knees took."""
     return float(walk.dissipated_J.sum())
 
 

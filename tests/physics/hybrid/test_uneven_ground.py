@@ -116,7 +116,7 @@ def test_tangents_over_uneven_steps_equal_finite_differences(name):
 
 
 def test_work_of_gravity_on_uneven_ground_includes_height_changes():
-    """And so does the cost of transport: what the walker descends is spent."""
+    """The cost of transport includes them as well: what the walker descends is spent."""
     _, walker, gait = gait_of("paper")
     weight = walker.mass * walker.gravity
     for height in (-5e-4, 5e-4):
@@ -189,7 +189,7 @@ def test_contact_walk_over_heights_of_zero_equals_even_ground_bit_for_bit(case):
 
 
 def test_stiffer_uneven_ground_brings_the_contact_walk_closer_to_the_rigid_one():
-    """Led towards the limit as tune does: stiffness, its root the damping, and slower creep."""
+    """The series to the limit is that of `tune`: stiffness, damping as its root, and slower creep."""
     config, walker, gait = gait_of("slope-3deg")
     heights, law = np.array([0.0, -2e-3, 1e-3, -1e-3, -1e-3]), config.contact
     rigid = take_walk(walker, TIGHT, gait.state, 3, heights=heights[:-1])
@@ -338,7 +338,7 @@ def test_last_listed_height_repeats_and_random_heights_do_not_depend_on_their_co
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
 def test_fall_is_judged_by_the_hip_height_above_the_foothold(leg):
-    """Stairs that lead down by a leg's length are walked: nothing falls but the ground."""
+    """The walker walks down stairs by a leg's length: only the ground falls."""
     _, walker, gait = gait_of("slope-3deg")
     heights = np.append(0.0, -1e-3 * np.arange(1, 701)) if leg == SWING else np.append(0.0, 1e-4 * np.arange(1, 701))
     walk = take_walk(walker, Tolerances("dop853", 1e-9, 1e-11, 10**8), gait.state, 700, heights=heights)

@@ -172,7 +172,9 @@ def angular_momentum(parts, spins, about):
 
 @given(st.tuples(angle, rate, rate))
 def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
-    """Of the whole about the new contact point; of the trailing leg about the hip, and half of the torso's."""
+    """These are the whole walker's about the new contact point, and the trailing leg's with half of the torso's about
+    the hip.
+    """
     stance, d_stance, d_thigh = numbers
     thigh = -2.0 * (SLOPE + KNEED.lean) - stance
     y = kneed_state((thigh, stance, thigh, d_thigh, d_stance, d_thigh))
@@ -308,7 +310,7 @@ def compiled_strikes(model, y, heel, knee):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 def test_compiled_code_reads_no_uninitialised_memory(phase):
-    """In Python unwritten scratch is no number, and what is compiled says the same."""
+    """In Python unwritten scratch is NaN, and compiled code gives the same results."""
     y = np.random.default_rng(1).uniform(-0.5, 0.5, 24)
     results = []
     for rate, strikes in ((compiled, compiled_strikes), (uncompiled(compiled), uncompiled(compiled_strikes))):

@@ -133,7 +133,7 @@ def impact_by_momenta(y):
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def velocities(omega, standing):
-        """Of the hip and of both leg masses, with one foot at rest."""
+        """Return the velocities of the hip and of both leg masses, with one foot at rest."""
         hip = -L * omega[standing] * (turn @ hip_to_foot[standing])
         return hip, [hip + (L - A) * omega[k] * (turn @ hip_to_foot[k]) for k in range(2)]
 
@@ -333,7 +333,7 @@ def test_lyapunov_exponent_is_positive_in_chaos_and_negative_on_a_stable_gait():
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
 def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
-    """Of means of normal noise whose correlation falls e-fold in so many steps: the mean is 0."""
+    """The means are those of normal noise with mean 0, whose correlation falls e-fold in some number of steps."""
     kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
     for step in range(1, noise.shape[1]):
         noise[:, step] += kept * noise[:, step - 1]

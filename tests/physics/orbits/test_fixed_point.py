@@ -53,7 +53,7 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-15, 10**5)
 
 
 class Counted(RigidStepper):
-    """A step map that counts what it costs."""
+    """A step map that counts its own steps."""
 
     def __init__(self, like, tolerances):
         super().__init__(like, tolerances)
@@ -71,7 +71,7 @@ def shooting(walker):
 
 
 def solve(shooting, walker, z, tolerance):
-    """By Newton's method for a walker in its own units, so that a step counts what it costs."""
+    """Run Newton's method for a walker in its own units, counting steps."""
     section = strike_section(assembled(walker))
 
     def mismatch(z):

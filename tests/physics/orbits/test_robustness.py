@@ -48,7 +48,7 @@ def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):
 
 
 def on_compliant_ground(name, key="slope_rad", changes=()):
-    """The same on the contact model's section, off its pads."""
+    """Return the same on the contact model's section, off its pads."""
     config = load(Path(name), changes).config
     rigid = standpoint(name, changes=changes)
     walker = rigid_walker(config, config.equations)
@@ -259,7 +259,7 @@ def test_gradients_equal_differences_of_converged_gaits(name, key):
 
 @pytest.mark.parametrize(("name", "key"), [("paper", "walker.foot_to_mass_m"), ("kneed", "walker.hip_mass_kg")])
 def test_gradients_on_compliant_ground_equal_differences_of_converged_gaits(name, key):
-    """Also by measures that put a foot of the same section coordinates in the air, or millimetres deep."""
+    """This includes measures that put a foot of the same section coordinates in the air, or millimetres deep."""
     at = on_compliant_ground(name, key)
     wanted = ("period_s", "step_length_m", "speed_m_s", "spectral_radius")
     found = gradients(at, abs(at.p), wanted)

@@ -103,7 +103,7 @@ def test_random_starts_agree_on_one_optimum():
 
 
 def bowls(x):
-    """Two bowls, the deeper one at 0.8; between 0.4 and 0.6 there is nothing."""
+    """Two bowls, the deeper one at 0.8, with no values between 0.4 and 0.6."""
     u = float(x[0])
     if 0.4 < u < 0.6:
         return None
@@ -165,7 +165,7 @@ def test_impossible_bounds_give_no_answer():
 
 
 def contact_gait(name):
-    """Its step, and the cost of transport as design has it."""
+    """Return a contact gait's step, and its cost of transport as `design` computes it."""
     config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait

@@ -300,7 +300,7 @@ def test_bad_recording_is_rejected_before_anything_is_computed(tmp_path):
 
 
 class Notes(Silent):
-    """Progress that keeps the lines it is to show."""
+    """A progress that keeps the lines it receives."""
 
     def __init__(self):
         self.lines = []
@@ -370,7 +370,7 @@ def test_impossible_path_is_rejected(name):
 
 
 def damaged(draw, lines):
-    """A recording with one thing wrong or odd, and what that is."""
+    """Return a recording with one defect, and the defect's name."""
     head, *rows = lines
     row, cell = draw.randrange(len(rows)), draw.randrange(3)
     cells = rows[row].split(",")

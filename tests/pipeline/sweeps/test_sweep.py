@@ -82,7 +82,7 @@ WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those
 
 
 def plain(sentences):
-    """Sentences with ordinary spaces."""
+    """Return sentences with ordinary spaces."""
     return [" ".join(sentence.split()) for sentence in sentences]
 
 

@@ -51,7 +51,7 @@ def caption_of(figure, results):
 
 
 def lines_of(axes, look):
-    """The lines of a look's colour and width that show data."""
+    """Return the data lines of a look's colour and width."""
     return [
         line
         for line in axes.lines
@@ -128,7 +128,7 @@ def test_every_figure_has_a_text_and_every_text_a_figure():
 
 
 def module_of(figure):
-    """Where a figure is drawn."""
+    """Return the module that draws a figure."""
     return getattr(figure.draw, "func", figure.draw).__module__
 
 

@@ -65,7 +65,7 @@ def plain(text):
 
 
 def texts(section):
-    """Everything that a section says, in one string."""
+    """Return everything that a section says, in one string."""
     return plain(repr(section.blocks).replace("\\xa0", " "))
 
 
@@ -385,7 +385,7 @@ def test_provenance_lists_key_digest_commit_and_command_of_each_result():
 
 
 def channels(walker):
-    """The numbers of a player's walker, by their names."""
+    """Return the numbers of a player's walker, by name."""
     floats = np.frombuffer(base64.b64decode(walker.track.pack()), "<f4").reshape(len(walker.track.channels), -1)
     return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 
