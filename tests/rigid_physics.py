@@ -80,7 +80,7 @@ def state_linked(model, phase, y):
 
 
 def momentum_of_masses(assembly, slope, y):
-    """Return the momentum along and normal to the slope (kg m/s), summed over the masses, standing on the second foot."""
+    """Sum the masses' momentum along and normal to the slope (kg m/s), standing on the assembly's second foot."""
     members = group_bodies(assembly).members
     theta, omega = members @ np.array(y).reshape(2, -1)[0], members @ np.array(y).reshape(2, -1)[1]
     foot = assembly.feet[1]

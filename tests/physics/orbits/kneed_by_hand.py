@@ -48,7 +48,7 @@ def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
 
 
 def mass_matrix(walker, theta):
-    """Return the mass matrix for the bodies' angles (4,), and the derivatives of the masses' velocities by the rates."""
+    """Return the mass matrix for the bodies' angles (4,), and the masses' velocities per rate."""
     J = 1j * walker.arms * np.exp(1j * theta)
     return (J.conj().T * walker.masses @ J).real + np.diag(walker.inertias), J
 

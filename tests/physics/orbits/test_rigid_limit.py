@@ -74,7 +74,7 @@ def test_full_damping_penetration_scales_with_static_penetration():
 
 
 def test_gait_with_push_off_converges_to_the_rigid_one_in_first_order():
-    """The ground stiffens and the pulse shortens together. With a pulse of constant duration there is no gait nearby."""
+    """The pulse shortens as the ground stiffens. With a pulse of constant duration there is no gait nearby."""
     config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
     rigid = find_gaits(rigid_walker(config, config.equations)).gait
     scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)
