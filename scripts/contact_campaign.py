@@ -1,4 +1,4 @@
-"""Random walks on compliant ground against a plain integration written for the tests: nothing differs but by errors.
+"""Compare random walks on compliant ground with a plain integration, written for the tests, up to numerical errors.
 
     python scripts/contact_campaign.py                 # 200 walks, seeds 0 to 199
     python scripts/contact_campaign.py --walks 6 --seed 3

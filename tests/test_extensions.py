@@ -82,7 +82,7 @@ WALK = (
 
 @pytest.fixture(scope="module")
 def walked(example):
-    """The example with a walk on its friction."""
+    """Return a walk of the example on its friction law."""
     done = example("contact-sim", *WALK, "--jobs", "1", "--json")
     assert done.returncode == 0, done.stderr
     return example, json.loads(done.stdout)

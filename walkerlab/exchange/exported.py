@@ -167,7 +167,7 @@ class Exported:
         return identifier(self.config.name)
 
     def describe(self, left_out: Iterable[str], commit: str | None, tilted: str) -> Iterator[str]:
-        """Yield the header of an exported file: its origin, what is tilted, the walk in walkerlab, and omissions."""
+        """Yield the header of an exported file: origin, what is tilted, walkerlab's own walk, and omissions."""
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
         yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted {tilted}."
         yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."

@@ -208,7 +208,7 @@ class ExploredConfig:
 
     @property
     def all_sets(self) -> list[str]:
-        """All changes of the config, as KEY=VALUE."""
+        """All changes to the config, as KEY=VALUE."""
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
