@@ -83,12 +83,12 @@ print(f"OpenCV, CAP_PROP_POS_FRAMES = 30: expected frame 30, actual frame {sough
 assert sought == 35, "behaviour has changed"
 repeated = [number_in(picture) for picture in iio.imread(FILM, plugin="FFMPEG")]
 rate_ffmpeg = iio.immeta(FILM, plugin="FFMPEG")["fps"]
-print(f"imageio, FFMPEG: expected 90 frames, actual {len(repeated)} frames; number 30 is frame {repeated[30]}; {rate_ffmpeg} frames/s")
+print(f"imageio, FFMPEG: expected 90 frames, actual {len(repeated)}; number 30 is frame {repeated[30]}; {rate_ffmpeg} frames/s")
 assert len(repeated) > COUNT and set(repeated) == set(range(COUNT)) and repeated[30] != 30, "behaviour has changed"
 in_turn = [number_in(picture) for picture in iio.imiter(FILM, plugin="pyav")]
 by_index = number_in(iio.imread(FILM, plugin="pyav", index=50))
 rate_pyav = iio.immeta(FILM, plugin="pyav")["fps"]
-print(f"imageio, pyav: {len(in_turn)} frames in turn; index=50: expected frame 50, actual frame {by_index}; {rate_pyav} frames/s")
+print(f"imageio, pyav: {len(in_turn)} frames in turn; index=50: expected frame 50, actual {by_index}; {rate_pyav} frames/s")
 assert in_turn == list(range(COUNT)) and by_index == 36 and rate_pyav == 30, "behaviour has changed"
 EOF
 venv/bin/python film.py
