@@ -8,7 +8,6 @@ import pytest
 from walkerlab.config.drives import drives_of
 from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
-from walkerlab.config.walkers import second_leg_of
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
@@ -42,7 +41,7 @@ def gait_of(config):
 
 def test_keys_of_leg_2_replace_those_of_leg_1():
     walker = config_of("paper", "walker.leg_2={leg_mass_kg: 5.5, foot_to_mass_m: 0.48}").walker
-    second = second_leg_of(walker)
+    second = walker.second
     assert (second.leg_mass_kg, second.foot_to_mass_m, second.leg_length_m) == (5.5, 0.48, 1.0)
     assert walker.total_mass_kg == 5.0 + 5.5 + 10.0
     first, other = assembly_of(walker).bodies

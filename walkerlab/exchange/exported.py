@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import walkerlab
-from walkerlab.config.drives import Hip, push_offs
+from walkerlab.config.drives import LINEAR, Hip, push_offs
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
@@ -207,6 +207,8 @@ def refuse(config: Config) -> None:
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
             "Set contact.terrain=checkerboard.",
         )
+    if config.walker.hip.law != LINEAR:
+        raise ConfigError(f"The hinge law {config.walker.hip.law} cannot be exported.", "Set walker.hip.law=linear.")
     if config.contact.terrain == "plane" and not config.ground.even:
         raise ConfigError(
             "Uneven ground can be exported only as pads of different heights.",

@@ -22,7 +22,7 @@ from walkerlab.physics.hybrid.rigid_walk import (
 )
 from walkerlab.physics.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import uncompiled
-from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
+from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_energy, hinge_law
 from walkerlab.physics.mechanics.impact import push_off_work
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,
@@ -259,7 +259,9 @@ class Recorder:
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
         torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
-        stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
+        stored = [
+            elastic_energies(laws[row], apart[1][row]) - elastic_energies(laws[row], apart[0][row]) for row in rows
+        ]
         hip = torque - float(np.sum(stored))
         # the energy of the springs is counted as work of the hip
         unsprung = walker.changed(laws=0.0) if walker.sprung else walker
@@ -335,6 +337,11 @@ class Recorder:
             mean_energy=self._mean_energy(strikes, after),
             samples=join(self.pieces) if self.pieces else None,
         )
+
+
+def elastic_energies(law: SpringDamper, angles: Array) -> Array:
+    """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
+    return np.array([hinge_energy(law, angle) for angle in angles])
 
 
 def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
