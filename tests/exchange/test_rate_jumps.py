@@ -82,4 +82,4 @@ def test_sums_of_squares_around_an_instant_equal_those_of_a_direct_fit():
             columns += [np.where(side, time - instant, 0.0) ** power for power in range(1, degree + 1)]
         basis = np.column_stack(columns)
         direct.append(np.sum((angle - basis @ np.linalg.lstsq(basis, angle)[0]) ** 2))
-    assert squares_around(time, angle, instants, 5, 3) == pytest.approx(direct, rel=1e-6)
+    assert squares_around([(time, angle)], instants[None], 5, 3)[0] == pytest.approx(direct, rel=1e-6)
