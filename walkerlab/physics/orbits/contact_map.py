@@ -21,17 +21,10 @@ from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import LOSS_ENTRIES
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
-from walkerlab.physics.ground.walker import (
-    ContactWalker,
-    OnGround,
-    feet_motion,
-    place_on_ground,
-    sines_cosines,
-    to_form,
-    to_full,
-)
+from walkerlab.physics.ground.walker import ContactWalker, OnGround
 from walkerlab.physics.hybrid.contact_jumps import state_rate
 from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_observer, present_walker, walk_on
@@ -153,7 +146,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
     """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
-    foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
+    foot = forms.feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
     depth = walker.normal.resting_foot(walker.mass * walker.gravity_down, walker.mass).depth
     along_rate = 1 + len(angled_bodies(walker, stance))
     moved = z.copy()
@@ -208,7 +201,7 @@ def step_from_section(
     start = state_on_section(walker, z, stance)
     # The stance foot stands in the middle of a pad.
     if site.ground.terrain.has_pads:
-        foothold = feet_motion(walker.whole, start)[stance].along
+        foothold = forms.feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
         site = replace_terrain(site, checkerboard(pitch_m, lanes))
     walk_state = walk_state_on_section(site, start, 2, stance)
@@ -219,14 +212,14 @@ def step_from_section(
     stopped = walk_on(walker, tolerances, walk_state, observer, start, 1)
     end = np.array(stopped.state)
     landed = 1 - stance
-    along = feet_motion(walker.whole, stopped.state)[landed].along
+    along = forms.feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     # Project the flow's derivative onto the section, along the flow.
     if derived:
         system = present_walker(walker, walk_state)
-        rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
+        rate = state_rate(system, forms.to_form(system.form, end), end.size, stopped.time_s)
         gradient = np.zeros(end.size)
         n = int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
@@ -273,7 +266,7 @@ def walk_from_section(
         # With room for a single touchdown, the walk stops there for the push.
         stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(
-            place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
+            forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
         )
         stopped = replace(stopped, state=pushed)
     landed = list[float]()
@@ -347,12 +340,12 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     """Return a state of the free walker just after an impulse (N s) at the hip along the slope."""
     form = system.form
     new = np.array(state)
-    y = to_form(form, new)
+    y = forms.to_form(form, new)
     n = int(form.bodies)
     half = int(form.places + form.bodies)
     s, c, r = np.zeros((3, n))
     M = np.zeros((n, n))
-    sines_cosines(form, y, s, c)
+    forms.sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     # A forward impulse above the centre of mass turns the walker clockwise.
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
@@ -360,14 +353,14 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     solve_linked(form.E[0], n, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r
-    return tuple(to_full(form, y, walker.size).tolist())
+    return tuple(forms.to_full(form, y, walker.size).tolist())
 
 
 def walk_state_on_section(site: WalkerOnGround, start: State, steps: int, stance: int) -> WalkState:
     """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
     swing = 1 - stance
     walk_state = new_walk_state(site.walker, site.ground, stance, steps, start)
-    feet = feet_motion(site.walker.whole, start)
+    feet = forms.feet_motion(site.walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
