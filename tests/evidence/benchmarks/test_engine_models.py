@@ -30,7 +30,7 @@ def scene(request):
 
 
 def our_samples(scene, interval_s, steps):
-    """Our own walk, as an engine with steps of `interval_s` would give it."""
+    """Return our own walk, sampled as an engine with steps of `interval_s` would."""
     result = simulate(scene, "radau5", 1e-9, steps, interval_s)
     return result, result.samples
 
@@ -99,7 +99,9 @@ def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
 
 
 def knees_seen(scene):
-    """Our own walk of two steps, what the rules remember of it, and when knees change: time, places before, after."""
+    """Return our own walk of two steps, the rules' record of it, and the changes of knees: time, places before and
+    after.
+    """
     result, samples = our_samples(scene, 1e-4, 2)
     rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
@@ -118,7 +120,7 @@ def knees_seen(scene):
     return result, rules, changes
 
 
-def test_rules_detect_the_same_knee_locks_and_releases_as_the_contact_walk():
+def test_knees_lock_and_release_in_engines_as_in_the_contact_walk():
     result, rules, changes = knees_seen(kneed())
     # the swing knee locks, the trailing one is released and locks in turn
     assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
@@ -149,7 +151,7 @@ DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.h
 
 
 def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
-    """In the twentieth of a second after the first touch."""
+    """Compare over a twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
     result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)
@@ -201,7 +203,7 @@ def test_ground_forces_do_the_work_measured_at_the_feet(scene):
         assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
-def test_rules_reproduce_touches_and_slip_of_the_contact_walk(scene):
+def test_touches_and_slip_in_engines_are_judged_as_in_the_contact_walk(scene):
     result, samples = our_samples(scene, 1e-4, 4)
     rules = RuleFollower(scene, 4, *scene.from_base(scene.start))
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
@@ -240,7 +242,7 @@ def test_touch_time_between_two_solver_steps_comes_from_a_cubic():
     assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
 
 
-def test_tuning_targets_the_law_under_the_weight_of_the_walker():
+def test_contact_is_tuned_to_the_law_under_the_weight_of_the_walker():
     scene = compass()
     target = contact_target(scene)
     law = scene.ours.normal

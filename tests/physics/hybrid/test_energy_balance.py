@@ -24,7 +24,7 @@ FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])
 
 @pytest.fixture
 def nothing_explained(monkeypatch):
-    """Every residual but none is too large."""
+    """Reject every energy residual that is not zero."""
     monkeypatch.setattr(contact_result, "RESIDUAL_FACTOR", 0.0)
 
 

@@ -44,7 +44,7 @@ BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
 
 
 def exchanged(walk):
-    """Energy that the ground and the knees took (J)."""
+    """Return the energy (J) that the ground and the knees took."""
     return float(walk.dissipated_J.sum())
 
 
@@ -183,7 +183,7 @@ def test_exact_derivatives_equal_finite_differences(knee):
     np.testing.assert_allclose(J, differences, atol=1e-5 * np.abs(differences).max())
 
 
-def test_scaled_twin_walks_the_same_steps():
+def test_scaled_copy_of_a_kneed_walker_takes_the_same_steps():
     one, other = walked(steps=3, tolerance=1e-9), walked(steps=3, tolerance=1e-9, scale=4.0)
     np.testing.assert_allclose(other.touch_time_s / 2.0, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)

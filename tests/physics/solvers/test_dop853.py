@@ -123,7 +123,10 @@ def arenstorf_derivative(system, t, y, f):
 
 @kernel
 def integrate(method, system, y, t_end, h, fraction, sample):
-    """From 0 to t_end in steps of h, or of the method's choice; the last step's dense output at `fraction` is kept."""
+    """Integrate from 0 to t_end in steps of h, or of the method's choice.
+
+    Keep the last step's dense output at `fraction`.
+    """
     begin(method, system, 0.0, y, h)
     status = STEP_DONE
     while method.clock[T] < t_end and status == STEP_DONE:
@@ -234,7 +237,7 @@ def test_solution_with_a_singularity_stops_at_the_smallest_step():
 
 @kernel
 def there_and_back(method, system, y, h, middle, back):
-    """One step, taken back, and half of it taken again."""
+    """Take a step, take it back, and take half of it again."""
     begin(method, system, 0.0, y, h)
     advance(method, system, 1e9)
     prepare_dense(method, system)
@@ -255,7 +258,7 @@ def test_step_can_be_repeated_up_to_an_event():
 
 
 class Twice(NamedTuple):
-    """The pair two times behind each other: more numbers than a block holds."""
+    """The pair twice in one state, which is larger than a block."""
 
 
 @block.case(Twice)

@@ -160,8 +160,8 @@ class Question:
     def explained_by(self, candidate: Candidate, gait: CheckedStep) -> Explanation | None:
         """Return what a candidate's gait explains, or None if it explains too little.
 
-        The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
-        right.
+        Of the printed numbers, at least three must be wrong, and the gait must reproduce every digit of all of them, or
+        at least of the states.
         """
         if self.reproduced(gait, self.state_items) != self.state_items:
             return None

@@ -107,7 +107,7 @@ class Convention:
         return self.arrange(np.stack((K @ (angles - tilt), K @ rates * self.rate_factor(walker))))
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
-        """Return the state that printed numbers describe. Bodies that are not printed move as in the state `known`."""
+        """Return the state that printed numbers describe. Bodies without printed numbers move as in `known`."""
         n = len(known) // 2
         count = len(self.order)
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))

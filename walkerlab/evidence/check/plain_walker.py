@@ -25,6 +25,7 @@ from scipy.integrate import DOP853
 from scipy.linalg.lapack import dposv
 
 from walkerlab.config.check import Instant
+from walkerlab.config.drives import LINEAR
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
@@ -441,7 +442,7 @@ def why_not_plain(config: RigidConfig) -> str:
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
-    return ""
+    return "" if config.walker.hip.hinge_law == LINEAR else "the plain model has no hinge laws of extensions"
 
 
 def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:

@@ -15,7 +15,7 @@ from walkerlab.physics.hybrid.rigid_record import Observer, RigidTally, new_obse
 from walkerlab.physics.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import uncompiled
 from walkerlab.physics.mechanics import rigid_model as rigid
-from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
+from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_energy, hinge_law
 from walkerlab.physics.mechanics.impact import push_off_work
 from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
 from walkerlab.physics.solvers.registry import Tolerances, finder_for
@@ -301,7 +301,7 @@ def driven_work(
     starts = np.vstack((start, after[:-1])) if len(after) else before
     apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
     torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
-    stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
+    stored = [elastic_energies(laws[row], apart[1][row]) - elastic_energies(laws[row], apart[0][row]) for row in rows]
     hip = torque - float(np.sum(stored))
     # the energy of the springs is counted as work of the hip
     unsprung = walker.changed(laws=0.0) if walker.sprung else walker
@@ -319,6 +319,11 @@ def driven_work(
     weight = float(walker.mass * walker.gravity)
     forward = float(tally.forward_work)
     return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
+
+
+def elastic_energies(law: SpringDamper, angles: Array) -> Array:
+    """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
+    return np.array([hinge_energy(law, angle) for angle in angles])
 
 
 def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:

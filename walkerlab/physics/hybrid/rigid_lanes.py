@@ -64,8 +64,10 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Convert a model of two equal straight legs for lanes, or return None for any other model."""
-    if len(model.arm_x) != 2 or model.kneed or model.legs_differ:
+    """Convert a model of two equal straight legs with a linear hip for lanes, or return None for any other model."""
+    hip = hinge_law(model, HIP_ROW)
+    # Laws of extensions are written for numbers, not for lanes.
+    if len(model.arm_x) != 2 or model.kneed or model.legs_differ or type(hip) is not SpringDamper:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (endings.FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
@@ -76,7 +78,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
     return TwoLegs(
         model,
         **values,
-        hip=hinge_law(model, HIP_ROW),
+        hip=hip,
         upright=math.atan2(x, y),
         # With large feet `lowest` may be below -1: the hip cannot get that low.
         fallen=math.acos(max(-1.0, lowest)),

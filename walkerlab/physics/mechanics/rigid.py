@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from walkerlab.physics.mechanics import parts, rigid_model
+from walkerlab.physics.mechanics.hinges import SpringDamper
 from walkerlab.physics.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel
 from walkerlab.physics.solvers.system import Floats
 
@@ -31,7 +32,9 @@ def rigid_on_slope(
     return rigid_model.change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
-def rigid_on_level_ground(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def rigid_on_level_ground(
+    assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper] = SpringDamper
+) -> RigidModel:
     """Build the rigid model of an assembly, which is a pair of models if the legs differ. Gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
@@ -39,7 +42,7 @@ def rigid_on_level_ground(assembly: parts.Assembly, gravity: float, knee_locked_
     """
     check_legs(assembly)
     models = [
-        swinging_first(each, gravity, knee_locked_at_strike)
+        swinging_first(each, gravity, knee_locked_at_strike, law)
         for each in (assembly, replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1]))
     ]
     if have_equal_legs(assembly):
@@ -52,7 +55,9 @@ def rigid_on_level_ground(assembly: parts.Assembly, gravity: float, knee_locked_
     return rigid_model.pair(models[0].changed(leg_length=models[1].leg_length), models[1])
 
 
-def swinging_first(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def swinging_first(
+    assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper]
+) -> RigidModel:
     """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
     hip = find_hip(assembly)
     groups = group_bodies(assembly)
@@ -80,6 +85,7 @@ def swinging_first(assembly: parts.Assembly, gravity: float, knee_locked_at_stri
     shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
     return rigid_model.new_rigid_model(
         n,
+        law,
         **parts.tree_about(assembly, root).merge_bodies(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],

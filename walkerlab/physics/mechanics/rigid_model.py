@@ -147,15 +147,15 @@ def compute_in_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> 
     return merged
 
 
-def new_rigid_model(n: int, **fields: Any) -> RigidModel:
-    """Create a rigid model of n bodies with the given fields. All others are zero."""
+def new_rigid_model(n: int, law: type[hinges.SpringDamper], **fields: Any) -> RigidModel:
+    """Create a rigid model of n bodies with a hinge law and the given fields. All others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
         **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
         "section": (n + 1,),
         "zero_state": (2 * n,),
     }
-    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes))
+    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes, law))
     model: RigidModel = blank[()]
     return model.changed(**fields)
 

@@ -191,7 +191,10 @@ def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]
 
 
 def input_digest(stage: Stage, result: Content) -> str:
-    """Return the digest of an input that a result records. For drawings, which show timings, it covers the file."""
+    """Return the digest of an input, as recorded in a result.
+
+    Drawings also show run times, so for them it covers the whole file.
+    """
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
