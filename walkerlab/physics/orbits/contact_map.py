@@ -31,18 +31,8 @@ from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_ob
 from walkerlab.physics.hybrid.contact_state import PASSING, JudgedGround, WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
 from walkerlab.physics.mechanics.tree import add_inertia, factor_linked, solve_linked
-from walkerlab.physics.orbits.step_map import (
-    CACHE_SIZE,
-    Cycle,
-    DisturbedWalk,
-    MappedStep,
-    Monitor,
-    StepMap,
-    Stepper,
-    failed_step,
-    valid,
-    walk_steps,
-)
+from walkerlab.physics.orbits import step_map as maps
+from walkerlab.physics.orbits.step_map import Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
@@ -411,7 +401,7 @@ class ContactMap(StepMap):
         first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
         """
 
-        @lru_cache(CACHE_SIZE)
+        @lru_cache(maps.CACHE_SIZE)
         def site_at(p: float) -> WalkerOnGround | None:
             site = walker_at(p)
             if site is None or not site.ground.terrain.has_pads:
@@ -444,16 +434,16 @@ class ContactMap(StepMap):
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)
         if site is None:
-            return failed_step(None, z.size)
+            return maps.failed_step(None, z.size)
         step = self._walk(site, z, derived, swing)
         if step.outcome is not Outcome.WALKED:
-            return failed_step(step.outcome, z.size)
+            return maps.failed_step(step.outcome, z.size)
         units, ahead = self._units[swing % 2], self._units[(swing + 1) % 2]
         DP = step.DP * units / ahead[:, None] if derived else step.DP
         return replace(step, z=step.z / ahead, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         slip = 0.0
         tripped = 0.0
         start = z
@@ -470,7 +460,7 @@ class ContactMap(StepMap):
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         start = z * self._units[swing % 2]
         walk = walk_from_section(site, endless, start, heights_m, push_N_s, self._stance(swing))
@@ -483,7 +473,7 @@ class ContactMap(StepMap):
         return z if site is None else stand(site.walker, z * self._units[0], self._stance(0)) / self._units[0]
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
@@ -491,7 +481,7 @@ class ContactMap(StepMap):
         return sample_legs_from_section(site, endless, start, heights_m, times, self._stance(0))
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        stride = walk_steps(self, z, p, self.stride, derived=False)
+        stride = maps.walk_steps(self, z, p, self.stride, derived=False)
         if stride.outcome is not Outcome.WALKED:
             return None
         works = [step.driven for step in stride.steps if isinstance(step, SectionStep)]
@@ -500,7 +490,7 @@ class ContactMap(StepMap):
         return DrivenWork(works[0].weight, *sums).cost_of_transport(math.fsum(stride.lengths_m))
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def replace_tolerances(self, tolerances: Tolerances) -> ContactMap:
