@@ -7,21 +7,12 @@ because its derivatives jump at them: solver steps that end at these points pres
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.friction import sample_switching, switching_count
 from walkerlab.physics.ground.knees import extension, extension_rate
 from walkerlab.physics.ground.normal_force import release_function, switching_penetration
 from walkerlab.physics.ground.terrain import cell_edges
-from walkerlab.physics.ground.walker import (
-    BENT,
-    BODY_VECTOR,
-    STOPPING,
-    FootMotion,
-    GroundModel,
-    OnGround,
-    foot_motion,
-    relative_to_ground,
-    sines_cosines,
-)
+from walkerlab.physics.ground.walker import BENT, BODY_VECTOR, STOPPING, FootMotion, GroundModel, OnGround
 from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, material_along
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
@@ -48,11 +39,11 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
     ground = walk_state.ground
     values = finder.values
     s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
-    sines_cosines(form, y, s, c)
+    forms.sines_cosines(form, y, s, c)
     values[events.PASSING, node] = 0.0
     for foot in range(2):
         first = foot * events.PER_FOOT
-        motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
+        motion = forms.relative_to_ground(system, foot, forms.foot_motion(form, foot, s, c, y))
         sample_foot(system, motion, cell_edges(ground.terrain, foot, walk_state.cells[foot]), first, node, finder)
         values[first + events.MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[events.PASSING, node] += motion.along if foot == 1 else -motion.along

@@ -5,20 +5,11 @@ from typing import Any
 import numpy as np
 
 from walkerlab.physics.energy_channels import KNEE_STOP, KNEE_STRIKES
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.knees import lock_knee
 from walkerlab.physics.ground.motion import motion_gradient
-from walkerlab.physics.ground.walker import (
-    BODY_VECTOR,
-    STOPPING,
-    ContactWalker,
-    GroundModel,
-    OnGround,
-    new_progress,
-    sines_cosines,
-    to_form,
-    to_full,
-)
+from walkerlab.physics.ground.walker import BODY_VECTOR, STOPPING, ContactWalker, GroundModel, OnGround
 from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver
 from walkerlab.physics.kernels import vector
@@ -44,13 +35,13 @@ def change_form(
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
-    x = to_full(before.form, y, size)
-    columns = to_full(before.form, Phi[: y.size], size)
+    x = forms.to_full(before.form, y, size)
+    columns = forms.to_full(before.form, Phi[: y.size], size)
     waits = np.zeros(Phi.shape[1])
     ends_step = event < events.PASSING and event % events.PER_FOOT == events.HEIGHT
     # The touch has already exchanged the legs' roles; before it, the other leg was the stance leg.
     if ends_step:
-        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
+        before = before._replace(progress=forms.new_progress(stance=1 - after.progress.stance))
     if events.EXTENSION_RATE <= event < events.PULSE_END:
         # The event has already latched this knee in the walk state, whose memory `before.knee` is. Before it, the stop
         # acted.
@@ -69,20 +60,20 @@ def change_form(
     if events.EXTENSION <= event < events.PULSE_END:
         x, lost, columns = lock_knee(whole, after.form, x, columns)
         observer.account[KNEE_STRIKES] += lost
-    z = to_form(after.form, x)
+    z = forms.to_form(after.form, x)
     if waits.size > 0:
         starts_push = ends_step and before.form.push_off != 0.0
         rate_after = np.zeros(size) if starts_push else state_rate(after, z, size, t)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
-        Phi[: z.size] = to_form(after.form, columns)
+        Phi[: z.size] = forms.to_form(after.form, columns)
     return z
 
 
 def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
     rate = np.zeros(y.size)
     right_hand_side(system, t, y, rate)
-    return to_full(system.form, rate, size)
+    return forms.to_full(system.form, rate, size)
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
@@ -97,7 +88,7 @@ def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
     foot = event // events.PER_FOOT
     row = 0 if event % events.PER_FOOT == events.HEIGHT else 1
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
-    sines_cosines(whole, x, s, c)
+    forms.sines_cosines(whole, x, s, c)
     projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
     # `motion_gradient` differentiates the penetration, which is minus the height.
     return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

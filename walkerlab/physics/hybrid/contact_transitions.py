@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import MIN_FLEXION, IdealLock, extension
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import (
@@ -11,17 +12,7 @@ from walkerlab.physics.ground.terrain import (
     height_of_pad,
     is_uneven,
 )
-from walkerlab.physics.ground.walker import (
-    BENT,
-    LOCKED,
-    RELEASED,
-    STOPPING,
-    FootMotion,
-    GroundModel,
-    OnGround,
-    feet_motion,
-    relative_to_ground,
-)
+from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, STOPPING, FootMotion, GroundModel, OnGround
 from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
 from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, is_above, is_ahead, material_along
@@ -47,8 +38,8 @@ def apply_event(
     if event >= events.EXTENSION:
         knee_stops(system.stop, walk_state, event, t)
         return GOES_ON
-    first, second = feet_motion(system.form, y)
-    feet = relative_to_ground(system, 0, first), relative_to_ground(system, 1, second)
+    first, second = forms.feet_motion(system.form, y)
+    feet = forms.relative_to_ground(system, 0, first), forms.relative_to_ground(system, 1, second)
     if event == events.PASSING:
         walk_state.sides[events.PASSING] = -walk_state.sides[events.PASSING]
         outcome = GOES_ON

@@ -9,17 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid import rigid_walk
 from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
 from walkerlab.physics.hybrid.rigid_record import Observer, RigidTally, new_observer, observe_start
-from walkerlab.physics.hybrid.rigid_walk import (
-    EVENTS,
-    LONGEST_SWING,
-    SHORTEST_LANDING,
-    hip_above_fall,
-    knee_angle,
-    new_heel_strikes,
-    walk,
-)
 from walkerlab.physics.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import uncompiled
 from walkerlab.physics.mechanics import rigid_model as rigid
@@ -36,6 +28,7 @@ BUDGET_OF_A_STEP = 50_000
 # friction coefficient, about as for rubber on dry concrete
 MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
+MAXIMA = ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio")  # of a tally and a result
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
 
@@ -126,14 +119,14 @@ def take_walk(
     rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
     if rises.any():
         judged_by = abs(rigid.swing_foot(walker, start)[1]) if step_length is None else step_length
-        recorder.nearest = SHORTEST_LANDING * judged_by
+        recorder.nearest = rigid_walk.SHORTEST_LANDING * judged_by
     height = rigid.swing_foot(walker, start)[0]
     # A start in mid-step, where no foot leaves the ground. With its own height as the foothold that it leaves, the
     # swing foot's event function is not taken for zero at the start.
     if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
-    if hip_above_fall(walker, start) < 0.0:
+    if rigid_walk.hip_above_fall(walker, start) < 0.0:
         return recorder.build_result(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
@@ -146,7 +139,7 @@ def take_walk(
 
 def is_straight(walker: RigidModel, start: State) -> bool:
     """Whether thigh and shank of the swing leg have the same angle and rate."""
-    knees = (knee_angle(walker, start, first) for first in (0, len(start) // 2))
+    knees = (rigid_walk.knee_angle(walker, start, first) for first in (0, len(start) // 2))
     return all(abs(knee) < STRAIGHT_KNEE for knee in knees)
 
 
@@ -166,9 +159,11 @@ class Recorder:
         self.steps = 0
         self.grid_index = 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
-        self.finder = finder_for(method, EVENTS, len(walker.zero_state))
+        self.finder = finder_for(method, rigid_walk.EVENTS, len(walker.zero_state))
         # walks with a library's method run in Python
-        self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
+        self.walk: Callable[..., tuple[int, int]] = (
+            rigid_walk.walk if tolerances.compiled else uncompiled(rigid_walk.walk)
+        )
         self.numbers = len(walker.zero_state)
         self.kneed = walker.kneed or walker.exchanged.kneed
         self.models = rigid.models_in_turn(walker)
@@ -185,11 +180,11 @@ class Recorder:
     def walk_on(self, rises: Array) -> Outcome:
         """Take up to `rises.size - 1` more steps. `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
-        seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
+        seen = rigid_walk.new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
         if self.sampled:
             # Enough samples even if every step takes the longest time that a swing may take.
-            room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            room = math.ceil(steps * rigid_walk.LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             # Each block of steps starts at a time of zero.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
@@ -203,7 +198,7 @@ class Recorder:
         part = observer.tally[()]
         for name in ("min_normal_force", "min_impulse"):
             total[name] = min(total[name], part[name])
-        for name in ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio"):
+        for name in MAXIMA:
             total[name] = max(total[name], part[name])
         for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
             total[name] += part[name]
@@ -277,11 +272,8 @@ class Recorder:
             before=before,
             after=after,
             min_normal_force=float(self.tally.min_normal_force),
-            max_friction_ratio=float(self.tally.max_friction_ratio),
-            max_scuff_depth=float(self.tally.max_scuff_depth),
             min_normal_impulse=float(self.tally.min_impulse) if self.steps else None,
-            max_impulse_ratio=float(self.tally.max_impulse_ratio),
-            energy_drift=float(self.tally.energy_drift),
+            **{name: float(self.tally[name]) for name in MAXIMA},
             mean_energy=mean_energy(self.walker, self.tally, self.start, strikes, after),
             samples=join(self.pieces) if self.pieces else None,
         )

@@ -14,16 +14,8 @@ from walkerlab.physics.kernels import kernel, kernel_part, vector
 from walkerlab.physics.mechanics import rigid_model as rigid
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
-from walkerlab.physics.solvers import stepping
-from walkerlab.physics.solvers.events import (
-    FALLING,
-    NO_CROSSING,
-    RISING,
-    CrossingFinder,
-    first_crossing,
-    shift_column,
-    value_at,
-)
+from walkerlab.physics.solvers import events, stepping
+from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder
 from walkerlab.physics.solvers.system import derivative
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
@@ -136,15 +128,15 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
-    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
+    strike = events.first_crossing(finder, HEEL_STRIKE, events.FALLING, 0.0, on_ground)
     # A foot that comes down behind the stance foot scuffs, which the model ignores.
-    while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
-        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
-    fall = first_crossing(finder, HIP_FALL, FALLING, 0.0, False)
+    while strike <= 1.0 and events.value_at(finder, AHEAD, strike) <= 0.0:
+        strike = events.first_crossing(finder, HEEL_STRIKE, events.FALLING, strike + 1e-12, on_ground)
+    fall = events.first_crossing(finder, HIP_FALL, events.FALLING, 0.0, False)
     knee_strike = NO_CROSSING
     if is_bent(system):
         straight = at_start and abs(finder.values[KNEE, 0]) < endings.STRAIGHT_KNEE
-        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if straight else 0.0, straight)
+        knee_strike = events.first_crossing(finder, KNEE, events.RISING, SEARCH_START if straight else 0.0, straight)
     return strike, fall, knee_strike
 
 
@@ -279,14 +271,14 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
                 # A foothold that rises meets the foot earlier: `upward` is negative.
                 wait += lift / upward
             waits[step, column - 1] = wait
-            shift_column(y, at, f, wait)
+            events.shift_column(y, at, f, wait)
     strike(model, model if knee else following, rigid.STRAIGHT if knee else rigid.AT_STRIKE, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
         derivative(Mode(model, rigid.STRAIGHT, system.behind, system.rise), t, before, f)
         for column in range(1, len(y) // (2 * n)):
-            shift_column(new, 2 * n * column, f, -waits[step, column - 1])
+            events.shift_column(new, 2 * n * column, f, -waits[step, column - 1])
     return t
 
 

@@ -20,12 +20,9 @@ from walkerlab.physics.mechanics import hinges, tree
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
-SWING = 0
-STANCE = 1
+SWING, STANCE = range(2)
 # indices into E: swing knee bent, swing leg straight, heel strike
-BENT = 0
-STRAIGHT = 1
-AT_STRIKE = 2
+BENT, STRAIGHT, AT_STRIKE = range(3)
 NO_SHANK = -1
 
 

@@ -98,13 +98,7 @@ FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
 
 # indices into `control`
-H_FACTORED = 0
-H_OLD = 1
-ERROR_OLD = 2
-RATE = 3
-SMOOTH = 4
-FRESH = 5
-UNKNOWNS = 6
+H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = range(7)
 
 
 @pass_by_reference
