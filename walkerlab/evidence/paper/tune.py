@@ -30,7 +30,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.rigid_groups import leg_variables
+from walkerlab.pipeline.stages.simulate import leg_variables
 from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
     TIME,
@@ -44,8 +44,8 @@ from walkerlab.pipeline.stages.walk import (
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, real_and_imaginary, rows_group
 from walkerlab.scene import contact
+from walkerlab.scene.contact import build_scaled_starts, scale_for_map
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)

@@ -28,7 +28,7 @@ from walkerlab.physics.orbits.rigid_limit import (
 from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.rigid_groups import leg_variables
+from walkerlab.pipeline.stages.simulate import leg_variables
 from walkerlab.pipeline.store.content import Group, columns, rows_group, values_by_column
 from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, contact_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
