@@ -3,7 +3,7 @@
 import functools
 import hashlib
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
@@ -133,6 +133,24 @@ def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     chosen = dispatch_by_type(declaration)
     chosen.default = declaration
     return chosen
+
+
+class LawKind(NamedTuple):
+    """Laws between which a config key chooses."""
+
+    laws: dict[str, Any]  # built-in classes by word
+    protocol: type
+    required: tuple[ByType, ...]  # functions of which each law needs a case
+    together: tuple[ByType, ...] = ()  # functions of which a law has cases of all or of none
+
+    def missing_members(self, law: type) -> list[str]:
+        """List what a law's class lacks: members of its protocol, and registered cases of functions."""
+        members = [name for name in vars(self.protocol) if not name.startswith("_")]
+        missing = [name for name in members if not hasattr(law, name)]
+        # A law with one of these functions needs the others: events that are counted must also be sampled.
+        together = self.together if any(law in function for function in self.together) else ()
+        cases = [function for function in (*self.required, *together) if law not in function]
+        return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]
 
 
 class ByAddress(types.Type):
