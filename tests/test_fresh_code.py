@@ -231,7 +231,7 @@ def digest_after_an_edit(unchanged, tmp_path_factory):
     [
         "__init__.py",
         "errors.py",
-        "evidence/paper/errata.py",
+        "evidence/paper/rows.py",
         "physics/orbits/small_slope.py",
         "physics/mechanics/parts.py",
     ],

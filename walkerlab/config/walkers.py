@@ -19,7 +19,7 @@ from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKne
 from walkerlab.errors import ConfigError
 from walkerlab.extensions import declared, load
 
-WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
+WISSE: Final = "Wisse, Walking Simulation Example, MATLAB files, Delft University of Technology (2003): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 MAX_LENGTH_M: Final = 1e3

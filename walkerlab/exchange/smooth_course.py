@@ -48,7 +48,7 @@ NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle 
 SUSPECT: Final = 0.5  # fraction of the limit above which stretch and strike are searched for together
 SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
 MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-SMALLEST_NORM: Final = 0.05  # smallest squared part of a stretch that polynomials do not follow, in samples
+SMALLEST_NORM: Final = 0.12  # smallest squared part of a stretch that polynomials do not follow, in samples
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
 
 

@@ -146,7 +146,10 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     fit = fits.get(degree + 1) or fits.get(degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
-    return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
+    if touch is None or touch.error_s >= PRECISE_S or off > ERRORS * touch.error_s:
+        return None
+    # A strike just before the recording looks like one at its first sample, as far off as the fit says.
+    return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
 
 
 def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch | None:

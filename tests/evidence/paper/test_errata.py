@@ -8,21 +8,21 @@ import pytest
 from numpy.testing import assert_allclose
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, impact
-from walkerlab.evidence.paper.errata import errata
-from walkerlab.evidence.paper.misprints import (
+from walkerlab.evidence.paper.printed import TABLE_2, X_P, speed_difference, walker_of_the_paper
+from walkerlab.evidence.paper.study import (
     MISPRINTED,
     RIGHT,
+    errata,
     fixed_point,
     foothold_speed_after_impact,
     height_over_slope,
     inertia_at_impact,
     step,
+    study_the_paper,
     swing_foot,
     swing_foot_gradient,
     velocities_after_impact,
 )
-from walkerlab.evidence.paper.printed import TABLE_2, X_P, speed_difference, walker_of_the_paper
-from walkerlab.evidence.paper.study import study_the_paper
 
 SLOPE = 0.0174
 BEFORE = (0.1674, -0.2022, -1.05, -0.45)

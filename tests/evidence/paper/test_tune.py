@@ -11,7 +11,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.errors import NoAnswer
 from walkerlab.evidence.paper import tune
-from walkerlab.evidence.paper.tune_limit import LimitFindings, causes
+from walkerlab.evidence.paper.tune import LimitFindings, causes
 from walkerlab.physics.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, ContactFactors, Distance, Extrapolation
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent

@@ -13,8 +13,13 @@ from walkerlab.evidence.paper.appendix_a import impact
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.evidence.verification.catalogue import config_of, package_cases, scaled, to_twin
 from walkerlab.evidence.verification.judge import time_difference
-from walkerlab.evidence.verification.momentum import RigidMasses, energy_won, feet_off_the_slope
-from walkerlab.evidence.verification.starts import case_tolerances, prepare_start
+from walkerlab.evidence.verification.starts import (
+    RigidMasses,
+    case_tolerances,
+    energy_won,
+    feet_off_the_slope,
+    prepare_start,
+)
 from walkerlab.evidence.verification.verdict import Measure, finite
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.orbits.fixed_point import find_gaits

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
-from walkerlab.evidence.verification.ordinary import MAX_ORDINARY_EVALUATIONS, Arrival, choices
+from walkerlab.evidence.verification.judge import MAX_ORDINARY_EVALUATIONS, Arrival, choices
 
 PAPER = next(case for case in package_cases() if case.name == "paper")
 ARRIVAL = Arrival("c", 1.0, np.zeros(8), np.ones(8))

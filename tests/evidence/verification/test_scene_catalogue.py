@@ -10,8 +10,8 @@ from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scaled, scene_cases, to_twin
 from walkerlab.evidence.verification.judge import CaseCell
-from walkerlab.evidence.verification.momentum import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.evidence.verification.stability import resolve_scene
+from walkerlab.evidence.verification.starts import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.errata import Erratum
+from walkerlab.evidence.paper.study import Erratum
 from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.stage import FIGURES

@@ -8,7 +8,7 @@ import pytest
 from html_page import Page
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.compared_releases import CONTACT_STEPS, RELEASES
+from walkerlab.evidence.paper.compare import CONTACT_STEPS, RELEASES
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runs import RunFolder

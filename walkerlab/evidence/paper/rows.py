@@ -9,9 +9,8 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.check.printed import Judged, Verdict
 from walkerlab.evidence.paper import printed
-from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
 from walkerlab.evidence.paper.measured import EQUATION_SETS, PAPER_CYCLES, Measured
-from walkerlab.evidence.paper.printed import Printed, speed_difference
+from walkerlab.evidence.paper.printed import Printed, contradictions, percent_left_open, speed_difference
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.evidence.paper.study import PaperStudy
 from walkerlab.physics.hybrid.comparison import Quantity

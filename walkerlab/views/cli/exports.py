@@ -33,7 +33,7 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.figures.style import EXPORT_DPI
 from walkerlab.views.report.tables import Table, as_csv, record_table
-from walkerlab.views.report.tex import as_tex
+from walkerlab.views.report.tex import COLUMN_WIDTHS, as_tex
 from walkerlab.views.report.words import MODEL_NAMES
 
 if TYPE_CHECKING:
@@ -42,11 +42,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """Destination of an export."""
+    """Destination and size of an export."""
 
     to: str | None  # format, or file name if `output` is None
     output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
+    columns: int = 1  # journal columns that a figure or a table for LaTeX spans
+    width: float | None = None  # width (pt) of a figure; None for that of the columns
+    dpi: int = EXPORT_DPI  # pixels per inch of a figure
 
     def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
         """Return file and format (default: first of `kinds`).
@@ -116,21 +119,8 @@ def run_to_export(run: str, request: Request) -> RunFolder:
     return folder
 
 
-def export_from(
-    folder: RunFolder,
-    what: str,
-    target: Target,
-    width: float,
-    model: str,
-    console: Console,
-    dpi: int = EXPORT_DPI,
-    columns: int = 1,
-) -> Path:
+def export_from(folder: RunFolder, what: str, target: Target, model: str, console: Console) -> Path:
     """Write an item of a run to a file and return its path.
-
-    width    width (pt) of a figure
-    dpi      pixels per inch of a figure
-    columns  journal columns that a table for LaTeX spans
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
@@ -138,7 +128,7 @@ def export_from(
         what = f"figure-{int(numbered[1]):02d}"
     make: Callable[[str], bytes]
     kinds: Sequence[str]
-    writers: dict[str, Callable[[Table], bytes]] = {"csv": as_csv, "tex": partial(as_tex, columns=columns)}
+    writers: dict[str, Callable[[Table], bytes]] = {"csv": as_csv, "tex": partial(as_tex, columns=target.columns)}
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what == STEPS:
@@ -148,7 +138,7 @@ def export_from(
     elif isinstance(item := find_item(folder, what), Table):
         stem, kinds, make = hyphenate(what), tuple(writers), lambda kind: writers[kind](item)
     else:
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, (width, dpi), console)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, target, console)
     path, kind = target.choose_file(what, f"{folder.name}-{stem}", kinds)
     return write_file(path, make(kind), console)
 
@@ -236,10 +226,8 @@ def plan_run(folder: RunFolder) -> Planner:
     return planner
 
 
-def figure(
-    folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
-) -> bytes:
-    """Draw a figure as on the page. `size` holds the width (pt) and the pixels per inch.
+def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
+    """Draw a figure as on the page, with the target's size.
 
     Raises StaleError if its results are missing.
     """
@@ -264,7 +252,7 @@ def figure(
             f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} recomputes them."
         )
     with refusing_older(folder, outdated):
-        return illustration.as_file(inputs, kind, *size)
+        return illustration.as_file(inputs, kind, target.width or COLUMN_WIDTHS[target.columns], target.dpi)
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:

@@ -118,9 +118,7 @@ def export(
         # Imported here: only this export needs a walker.
         from walkerlab.views.cli.models import write_model
 
-        how = slope or "gravity"
-        paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings, how)
-        for path in paths:
+        for path in write_model(run, request, Target(to, output), law, slope or "gravity"):
             print(path)
         return
     if slope is not None:
@@ -128,12 +126,10 @@ def export(
     if request.sets:
         raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
     from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
-    from walkerlab.views.report.tex import COLUMN_WIDTHS
 
     folder = run_to_export(run, request)
-    points = width or COLUMN_WIDTHS[columns]
-    whose = walk_in(folder, model)
-    print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
+    target = Target(to, output, columns=columns, width=width, dpi=dpi)
+    print(export_from(folder, what, target, walk_in(folder, model), request.console))
 
 
 def draw(

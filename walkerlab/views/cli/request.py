@@ -211,35 +211,31 @@ def exit_on_failure(request: Request) -> Iterator[None]:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
-    def print_failed(error: WalkerlabError) -> None:
-        """With `--json`, print an object that describes the failure."""
+    def fail(error: WalkerlabError) -> typer.Exit:
+        """Print a failure and, with `--json`, an object that describes it, and return the exit that it causes."""
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
             print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})
+        print_error(error, request.typed_for)
+        return typer.Exit(error.exit_code)
 
     try:
         yield
         # Otherwise an error of the output would appear at exit, as a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
-        print_failed(error)
-        print_error(error, request.typed_for)
-        raise typer.Exit(error.exit_code) from None
+        raise fail(error) from None
     except KeyboardInterrupt:
-        stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
-        print_failed(stopped)
-        print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
-        raise typer.Exit(stopped.exit_code) from None
+        advice = "Finished results are kept; the same command computes the rest."
+        raise fail(StoppedError("interrupted", advice)) from None
     except BrokenPipeError:
         discard_output()
         raise typer.Exit(0) from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
-            print_failed(too_long)
-            print_error(too_long)
-            raise typer.Exit(too_long.exit_code) from None
+            raise fail(too_long) from None
         # An error without a file name is one of the output.
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
@@ -275,7 +271,9 @@ def as_json(error: WalkerlabError, request: Request) -> dict[str, Any]:
 
 
 def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:
-    print(f"error: {error.message}", file=sys.stderr)
+    # A user who stops a command knows that this is no error.
+    lead = "" if isinstance(error, StoppedError) else "error: "
+    print(f"{lead}{error.message}", file=sys.stderr)
     if error.advice:
         print(f"advice: {add_run_options(error.advice, options_of)}", file=sys.stderr)
 

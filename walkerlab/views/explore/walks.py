@@ -257,11 +257,7 @@ def walk(question: ExploredConfig) -> Answered:
         no_answer = answers[stage].no_answer
         answer[stage] = answers[stage].findings
         if no_answer is not None:
-            answer[stage]["error"] = {
-                "message": no_answer.message,
-                "advice": no_answer.advice,
-                "exit_code": no_answer.exit_code,
-            }
+            answer[stage]["error"] = no_answer.as_json()
             if stage == "fixedpoint":
                 break
         elif stage != "fixedpoint":
