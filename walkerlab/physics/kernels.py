@@ -143,15 +143,6 @@ class LawKind(NamedTuple):
     required: tuple[ByType, ...]  # functions of which each law needs a case
     together: tuple[ByType, ...] = ()  # functions of which a law has cases of all or of none
 
-    def missing_members(self, law: type) -> list[str]:
-        """List what a law's class lacks: members of its protocol, and registered cases of functions."""
-        members = [name for name in vars(self.protocol) if not name.startswith("_")]
-        missing = [name for name in members if not hasattr(law, name)]
-        # A law with one of these functions needs the others: events that are counted must also be sampled.
-        together = self.together if any(law in function for function in self.together) else ()
-        cases = [function for function in (*self.required, *together) if law not in function]
-        return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]
-
 
 class ByAddress(types.Type):
     """Numba's type of a NamedTuple that is passed by its address: see `pass_by_reference`."""

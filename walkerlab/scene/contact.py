@@ -125,11 +125,12 @@ def scene_on_pads(
 
 
 def contact_drives(config: ContactConfig) -> ContactDrives:
+    law = law_class("hinge_law", config.walker.hip.hinge_law)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(law_class("hinge_law", config.walker.hip.hinge_law), fields)
+    return ContactDrives(law, fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:

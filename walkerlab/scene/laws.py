@@ -23,7 +23,7 @@ def law_class(key: str, word: str) -> Any:
         law = kind.laws.get(word) or load(declared(key)[word])
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"{error}.", where_to_look(kind)) from error
-    if missing := kind.missing_members(law):
+    if missing := missing_members(law, kind):
         named = f"the {key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
         raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(kind))
     return law
@@ -40,3 +40,13 @@ def ground_law(key: str, contact: Contact) -> Any:
 
 def where_to_look(kind: LawKind) -> str:
     return f"{kind.protocol.__name__} in {kind.protocol.__module__} lists the members of a law."
+
+
+def missing_members(law: type, kind: LawKind) -> list[str]:
+    """List what a law's class lacks: members of its protocol, and registered cases of functions."""
+    members = [name for name in vars(kind.protocol) if not name.startswith("_")]
+    missing = [name for name in members if not hasattr(law, name)]
+    # A law with one of these functions needs the others: events that are counted must also be sampled.
+    together = kind.together if any(law in function for function in kind.together) else ()
+    cases = [function for function in (*kind.required, *together) if law not in function]
+    return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]
