@@ -23,11 +23,11 @@ import walkerlab
 from walkerlab.config import reads
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
-from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.friction import FRICTION_LAWS, friction_coefficient
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.laws import LAW_KINDS, missing_members
+from walkerlab.scene.laws import missing_members
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration
 
@@ -123,7 +123,7 @@ def test_example_stage_of_the_docs_runs(monkeypatch):
 def test_example_friction_law_of_the_docs_is_complete_and_its_derivative_correct(monkeypatch):
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
     example = runpy.run_path(str(ROOT / "docs" / "examples" / "extension" / "tanh_friction" / "law.py"))["Tanh"]
-    assert missing_members(example, LAW_KINDS["friction"]) == []
+    assert missing_members(example, FRICTION_LAWS) == []
     law, h = example.from_contact(Contact(units="si")), 1e-6
     assert law == pytest.approx((0.7, 0.1, 0.3, 0.3))
     low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))

@@ -11,7 +11,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD
-from walkerlab.scene.measurement_plan import ANGLES, plan_measurements, predict_measured, walk_of
+from walkerlab.pipeline.stages.plan import ANGLES, plan_measurements, predict_measured, walk_of
 from walkerlab.scene.subject import find_model_gait
 
 KEYS = ("slope_deg", "walker.leg_length_m")

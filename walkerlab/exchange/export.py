@@ -79,27 +79,25 @@ def export_model(
     return ExportedFiles(files, left_out)
 
 
-def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names.
-
-    Raises ConfigError for an unknown name.
-    """
-    return choose(text, CONTACT_LAWS, "--law", "contact law")
-
-
-def parse_slope(text: str) -> Slope:
-    """Return the way to express a slope that `text` names.
-
-    Raises ConfigError for an unknown name.
-    """
-    return choose(text, SLOPES, "--slope", "way to express a slope")
-
-
 def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Choice:
+    """Return the choice that the text of an option names.
+
+    Raises ConfigError for an unknown name.
+    """
     for choice in choices:
         if text == choice:
             return choice
     raise ConfigError(f"{option} {text}: unknown {what}.", f"Choose from {', '.join(choices)}.")
+
+
+def parse_law(text: str) -> Law:
+    """Return the ADAMS contact law that `text` names, as `choose` does."""
+    return choose(text, CONTACT_LAWS, "--law", "contact law")
+
+
+def parse_slope(text: str) -> Slope:
+    """Return the way to express a slope that `text` names, as `choose` does."""
+    return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
 def add_stops(config: Config) -> Config:

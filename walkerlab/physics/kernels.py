@@ -3,7 +3,7 @@
 import functools
 import hashlib
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
@@ -125,6 +125,15 @@ def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     chosen = dispatch_by_type(declaration)
     chosen.default = declaration
     return chosen
+
+
+class LawKind(NamedTuple):
+    """Force laws that a config key can select."""
+
+    laws: dict[str, Any]  # built-in classes by word
+    protocol: type
+    required: tuple[ByType, ...]  # functions of which each law needs a case
+    together: tuple[ByType, ...] = ()  # functions of which a law has cases of all or of none
 
 
 class ByAddress(types.Type):

@@ -1,4 +1,6 @@
-"""Build the contact model of a config, with only the parts that the config needs, and the laws of its ground."""
+"""Build the contact model of a config, with only the parts that the config needs, the laws of its ground, and starts
+with scaled velocities, for maps and basins.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,14 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swi
 from walkerlab.physics.ground.walker import floating_state
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround
+from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.mechanics.parts import Assembly
 from walkerlab.physics.mechanics.rigid import group_bodies
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between_touches
+from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.laws import ground_law, law_class
@@ -119,11 +125,12 @@ def scene_on_pads(
 
 
 def contact_drives(config: ContactConfig) -> ContactDrives:
+    law = law_class("hinge_law", config.walker.hip.hinge_law)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(law_class("hinge_law", config.walker.hip.hinge_law), fields)
+    return ContactDrives(law, fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -231,3 +238,37 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
         "pitch_m": scene.pitch_m,
         "friction": scene.walker.friction.describe(),
     }
+
+
+# Except at boundaries between outcomes, these tolerances give the same map as the config's.
+MAP_RTOL = 1e-4
+MAP_ATOL = 1e-6
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
+
+
+def build_scaled_starts(
+    scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
+) -> scaled_starts.ScaledStarts:
+    """Build starts with scaled velocities from a rigid start. If the contact gait is known, walks must settle on it."""
+    gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
+
+    def start(swing: float, stance: float) -> State:
+        return start_state(scene, scale_rates(rigid, state, swing, stance))
+
+    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, gait)
+    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
+
+
+def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
+    """Return period (s) and length (m) of each step of a gait, which is a single step for equal legs."""
+    if len(gait.steps) == 1:
+        return ((gait.period_s, gait.step.length_m),)
+    return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))
+
+
+def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
+    """Return the starts with the solver settings of a map.
+
+    evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
+    """
+    return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

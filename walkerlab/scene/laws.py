@@ -1,67 +1,41 @@
 """Laws that a config names: those of the ground and of the hinges, built-in ones and those of extensions."""
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from walkerlab.config.contact import Contact
 from walkerlab.errors import ConfigError
 from walkerlab.extensions import declared, load
-from walkerlab.physics.ground.friction import (
-    FRICTION_LAWS,
-    FrictionLaw,
-    friction_coefficient,
-    sample_switching,
-    switching_count,
-)
-from walkerlab.physics.ground.normal_force import (
-    NORMAL_LAWS,
-    NormalLaw,
-    elastic_energy,
-    normal_force,
-    release_function,
-)
-from walkerlab.physics.mechanics.hinges import HINGE_LAWS, SpringDamper, hinge_energy, hinge_torque
+from walkerlab.physics.ground.friction import FRICTION_LAWS
+from walkerlab.physics.ground.normal_force import NORMAL_LAWS
+from walkerlab.physics.kernels import LawKind
+from walkerlab.physics.mechanics.hinges import HINGE_LAWS
+
+LAW_KINDS: Final = {"normal_force": NORMAL_LAWS, "friction": FRICTION_LAWS, "hinge_law": HINGE_LAWS}
 
 
-class LawKind(NamedTuple):
-    """Force laws that a config key can select."""
-
-    laws: dict[str, Any]  # built-in classes by word
-    protocol: type
-    required: tuple[Any, ...]  # functions of which each law needs a case
-    together: tuple[Any, ...] = ()  # functions of which a law has cases of all or of none
-
-
-LAW_KINDS: Final = {
-    "normal_force": LawKind(NORMAL_LAWS, NormalLaw, (normal_force, release_function, elastic_energy)),
-    "friction": LawKind(FRICTION_LAWS, FrictionLaw, (friction_coefficient,), (switching_count, sample_switching)),
-    "hinge_law": LawKind(HINGE_LAWS, SpringDamper, (hinge_torque, hinge_energy)),
-}
-
-
-def law_class(kind: str, word: str) -> Any:
-    """Return the class of the law that a config names, of a kind in `LAW_KINDS`.
+def law_class(key: str, word: str) -> Any:
+    """Return the class of the law that a config names under a key of `LAW_KINDS`.
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
-    laws = LAW_KINDS[kind]
+    kind = LAW_KINDS[key]
     try:
-        law = laws.laws.get(word) or load(declared(kind)[word])
+        law = kind.laws.get(word) or load(declared(key)[word])
     except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{error}.", where_to_look(laws)) from error
-    if missing := missing_members(law, laws):
-        name = kind.removesuffix("_law").replace("_", "-")
-        named = f"the {name} law {law.__name__} ('{word}')"
-        raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(laws))
+        raise ConfigError(f"{error}.", where_to_look(kind)) from error
+    if missing := missing_members(law, kind):
+        named = f"the {key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
+        raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(kind))
     return law
 
 
-def ground_law(kind: str, contact: Contact) -> Any:
+def ground_law(key: str, contact: Contact) -> Any:
     """Create the law that a contact block in SI names. Raises ConfigError as `law_class` does."""
-    law = law_class(kind, getattr(contact, kind))
+    law = law_class(key, getattr(contact, key))
     try:
         return law.from_contact(contact)
     except (TypeError, AttributeError) as error:
-        raise ConfigError(f"{error}.", where_to_look(LAW_KINDS[kind])) from error
+        raise ConfigError(f"{error}.", where_to_look(LAW_KINDS[key])) from error
 
 
 def where_to_look(kind: LawKind) -> str:

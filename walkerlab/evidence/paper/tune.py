@@ -44,7 +44,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.rigid_groups import leg_variables
+from walkerlab.pipeline.stages.simulate import leg_variables
 from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
     TIME,
@@ -67,10 +67,16 @@ from walkerlab.pipeline.store.content import (
     values_by_column,
 )
 from walkerlab.scene import contact
-from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, contact_drives, knee_rules, start_state
+from walkerlab.scene.contact import (
+    SAMPLES_PER_PENDULUM_TIME,
+    build_scaled_starts,
+    contact_drives,
+    knee_rules,
+    scale_for_map,
+    start_state,
+)
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 SAMPLING_FACTOR = 4  # factor on contact-sim's sampling rate; keeps interpolation errors far below the model error

@@ -11,11 +11,12 @@ type of a model names it, as it fixes the number of bodies, so each kernel is co
 
 from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from walkerlab.physics.compiler import classes_named_by
 from walkerlab.physics.kernels import (
     ALWAYS_INLINE_FLAGS,
+    LawKind,
     compile_as,
     dispatch_by_type_or_default,
     forced_inline,
@@ -76,7 +77,7 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-HINGE_LAWS: dict[str, type[SpringDamper]] = {"linear": SpringDamper}
+HINGE_LAWS: Final = LawKind({"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy))
 """Hinge laws by their names in `walker.hip.hinge_law` of a config."""
 LAW_NUMBERS = len(SpringDamper._fields)
 DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))
