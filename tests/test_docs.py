@@ -27,7 +27,7 @@ from walkerlab.physics.ground.friction import friction_coefficient
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.contact import LAW_KINDS, missing_members
+from walkerlab.scene.laws import LAW_KINDS, missing_members
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration
 
