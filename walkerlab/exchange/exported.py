@@ -207,8 +207,10 @@ def refuse(config: Config) -> None:
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
             "Set contact.terrain=checkerboard.",
         )
-    if config.walker.hip.law != LINEAR:
-        raise ConfigError(f"The hinge law {config.walker.hip.law} cannot be exported.", "Set walker.hip.law=linear.")
+    if config.walker.hip.hinge_law != LINEAR:
+        raise ConfigError(
+            f"The hinge law {config.walker.hip.hinge_law} cannot be exported.", "Set walker.hip.hinge_law=linear."
+        )
     if config.contact.terrain == "plane" and not config.ground.even:
         raise ConfigError(
             "Uneven ground can be exported only as pads of different heights.",

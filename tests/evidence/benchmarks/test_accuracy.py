@@ -19,16 +19,15 @@ from walkerlab.evidence.benchmarks.accuracy import (
     omitted_tolerances,
     summarise,
 )
-from walkerlab.evidence.benchmarks.trials import (
-    USER_SCRIPT,
+from walkerlab.evidence.benchmarks.references import (
     End,
     Reference,
-    RigidTrial,
-    TrialRun,
     WalkEndsError,
     first_end,
     reference_for,
+    walk_by_taylor,
 )
+from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.store.content import rows_group
@@ -67,6 +66,11 @@ def test_reference_without_taylor_series_also_has_two_methods():
     reference = reference_for(replace(TRIAL, compass=None, steps=1))
     assert {reference.first.method, reference.second.method} == {"dop853", "radau5"}
     assert reference.agreement < 1e-10
+
+
+def test_taylor_walk_whose_state_overflows_has_no_end():
+    pytest.importorskip("heyoka")
+    assert walk_by_taylor(TRIAL.compass, (-0.2, 0.17, 0.0, 1e200), 1) is None
 
 
 def test_every_method_converges_to_the_reference(rows):

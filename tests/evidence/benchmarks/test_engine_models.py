@@ -163,7 +163,7 @@ def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
     powers = []
     for i in range(begin, end + 1):
         q, v = scene.from_base(tuple(samples.states[i]))
-        powers.append(float(rules.forces(float(samples.time_s[i]), q, v) @ v))
+        powers.append(float(rules.probe.forces(float(samples.time_s[i]), q, v) @ v))
     elastic = 0.5 * hinge_law(scene.ours.whole, HIP_ROW).stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
     given = samples.driven_J[end].sum() - samples.driven_J[begin].sum() + elastic[begin] - elastic[end]
     assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
@@ -190,10 +190,10 @@ def test_ground_forces_do_the_work_measured_at_the_feet(scene):
         q, v = scene.from_base(tuple(samples.states[i]))
         rules = RuleFollower(scene, 3, *scene.from_base(scene.start))
         rules.walk_state.has_ground[:] = samples.has_ground[i]
-        forces = rules.forces(0.0, q, v).copy()
+        forces = rules.probe.forces(0.0, q, v).copy()
         law, friction = scene.ours.normal, scene.ours.friction
         power = 0.0
-        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.feet(q, v)):
+        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.probe.feet(q, v)):
             if height < 0.0 and samples.has_ground[i, foot]:
                 depth = -height
                 share = min(1.0, depth / law.full_damping_penetration)

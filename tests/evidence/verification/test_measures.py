@@ -97,7 +97,7 @@ def test_scaling_a_walker_to_another_size_and_back_restores_it():
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
 def test_driven_walkers_of_two_sizes_are_equal_at_unit_size(name):
-    hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "law")
+    hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "hinge_law")
     sets = (*hip, "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config
     own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))

@@ -251,14 +251,13 @@ def test_step_derivative_through_lock_and_release_equals_its_slope():
     methods = settings(1e-11)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     z = next(section_points(scene.walker, scene.ground, settings(1e-10), start))[1]
-    at = step_from_section(scene.walker, scene.ground, methods, z, STEP)
+    at = step_from_section(scene, methods, z, STEP)
     assert at.outcome is Outcome.WALKED
     back = coordinates_of(scene.walker, np.array(state_on_section(scene.walker, z, stance)), stance)
     np.testing.assert_allclose(back, z, atol=1e-15)
     for column, step in ((1, 3e-5), (2, 3e-5), (5, 3e-4), (6, 3e-4), (7, 3e-5)):
         ahead, behind = (
-            step_from_section(scene.walker, scene.ground, methods, z + sign * step * np.eye(z.size)[column], STEP).z
-            for sign in (1, -1)
+            step_from_section(scene, methods, z + sign * step * np.eye(z.size)[column], STEP).z for sign in (1, -1)
         )
         slope = (ahead - behind) / (2.0 * step)
         np.testing.assert_allclose(at.DP[:, column], slope, atol=2e-4 * np.abs(at.DP).max())

@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.attractors import (
     standard_error,
     sweep_attractor,
 )
-from walkerlab.physics.orbits.bifurcations import GaitEquations, bialternate_product
+from walkerlab.physics.orbits.bifurcations import GaitEquations, bialternate_product, eigenvector
 from walkerlab.physics.orbits.continuation import CurvePoint, Segment, StepControl, correct, root_along, step_along
 from walkerlab.physics.orbits.families import (
     NO_WALKER,
@@ -499,6 +499,19 @@ def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     found = np.linalg.eigvals(bialternate_product(DP))
     assert np.max([np.min(np.abs(found - product)) for product in products]) < 1e-10
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
+
+
+def test_a_complex_pair_gives_a_direction_in_its_own_plane():
+    """Also if another multiplier equals the pair's real part, which is then nearest to being singular."""
+    pair = 1.2 * np.exp(1j)
+    basis = np.random.default_rng(0).normal(size=(3, 3))
+    turning = np.array([[pair.real, -pair.imag, 0.0], [pair.imag, pair.real, 0.0], [0.0, 0.0, pair.real]])
+    A = basis @ turning @ np.linalg.inv(basis)
+    direction = eigenvector(A, pair)
+    assert np.linalg.norm(direction) > 0.5
+    # in the plane, A satisfies the pair's own quadratic equation
+    squared = A @ A @ direction - 2.0 * pair.real * A @ direction + abs(pair) ** 2 * direction
+    assert squared == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 def test_only_repeating_sequences_have_a_period():

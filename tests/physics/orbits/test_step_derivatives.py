@@ -112,7 +112,7 @@ def scene():
 
 def stepped(scene, z, tolerance):
     tolerances = Tolerances("radau5", tolerance, 1e-2 * tolerance, 10**6)
-    step = step_from_section(scene.walker, scene.ground, tolerances, z, PITCH)
+    step = step_from_section(scene, tolerances, z, PITCH)
     assert step.outcome is Outcome.WALKED
     return step
 

@@ -34,13 +34,12 @@ from walkerlab.physics.solvers.system import block, derivative
 
 def matrix(stages):
     A = np.zeros((stages, stages))
-    for s in range(2, stages + 1):
-        row = getattr(tableau, f"A_{s}")
-        A[s - 1, : len(row)] = row
+    for s, row in enumerate(tableau.A[:stages]):
+        A[s, : len(row)] = row
     return A
 
 
-A, B, C = matrix(12), np.array(tableau.A_13), np.array(tableau.NODES[:12])
+A, B, C = matrix(12), np.array(tableau.A[12]), np.array(tableau.NODES[:12])
 
 
 def defects(weights, order):
@@ -53,7 +52,7 @@ def test_number_of_trees_agrees_with_cayley():
 
 def test_tableau_nodes_equal_the_row_sums_of_their_stages():
     assert A.sum(axis=1) == pytest.approx(C, abs=1e-14)
-    extra = [sum(getattr(tableau, f"A_{s}")) for s in (14, 15, 16)]
+    extra = [sum(row) for row in tableau.A[13:]]
     assert extra == pytest.approx(tableau.NODES[13:16], abs=1e-14)
 
 

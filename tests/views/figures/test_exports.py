@@ -1,6 +1,7 @@
 """What leaves a run for use elsewhere: figures, tables, trajectories, films."""
 
 import csv
+import io
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.provenance import begin
 from walkerlab.pipeline.store.runs import Record, RunFolder
 from walkerlab.views.cli.console import Console
-from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
+from walkerlab.views.cli.exports import Film, Target, export_from, gif, walk_in, write_film
 from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.stage import FIGURES
@@ -213,6 +214,23 @@ def test_number_of_film_frames_follows_from_duration_and_rate(run, tmp_path):
         first = np.asarray(film.convert("L"))
         film.seek(5)
         assert (np.asarray(film.convert("L")) != first).any()
+
+
+@pytest.mark.parametrize("rate", [24, 25, 30, 50])
+def test_gif_lasts_as_long_as_its_pictures_at_their_rate(rate):
+    pictures = np.zeros((3 * rate, 4, 4, 3), np.uint8)
+    pictures[np.arange(3 * rate), 0, 0] = np.arange(3 * rate)[:, None]
+    with Image.open(io.BytesIO(gif(pictures, rate))) as film:
+        total_ms = 0
+        for number in range(film.n_frames):
+            film.seek(number)
+            total_ms += film.info["duration"]
+    assert total_ms == 3000
+
+
+def test_gif_that_browsers_slow_down_is_rejected(run):
+    with pytest.raises(ConfigError, match="browsers slow a GIF above 50 frames per second"):
+        write_film(run, Target("gif", None), Film("simulate", 1, 60, 1.0), QUIET)
 
 
 def test_film_of_both_models_needs_both_walks(run, tmp_path):

@@ -114,15 +114,8 @@ def compare_motion(
     orbit = None
     time, raw = comparison.difference_in_time(contact, rigid)
     errors = {"raw": raw}
-    groups = {
-        "errors": Group(
-            {
-                **variables_over_time(time=time),
-                **leg_labels(),
-                **differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time"),
-            }
-        )
-    }
+    in_time = differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time")
+    groups = {"errors": Group({**variables_over_time(time=time), **leg_labels(), **in_time})}
     missing = ("differences in phase and between the orbits", "step")
     if steps:
         missing = ("differences of the last stride and between the orbits", "stride")
@@ -140,12 +133,10 @@ def compare_motion(
         if steps >= STEPS_PER_STRIDE:
             last = slice(-STEPS_PER_STRIDE, None)
             errors["settled"] = select(select(aligned, last), smooth[last])
-            distances = comparison.orbit_distances(contact, rigid)
             text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
-            groups["orbit"] = Group(
-                {**leg_labels(), "orbit_distance": Variable(distances, (LEG,), "1", f"{text}ranges")}
-            )
-            orbit = distances.tolist()
+            distances = Variable(comparison.orbit_distances(contact, rigid), (LEG,), "1", f"{text}ranges")
+            groups["orbit"] = Group({**leg_labels(), "orbit_distance": distances})
+            orbit = distances.values.tolist()
     what, needed = missing
     lacking = {"what": what, "why": f"no {needed} was completed by both models"}
     return Comparison(errors, orbit, groups, () if steps >= STEPS_PER_STRIDE else (lacking,))
@@ -182,15 +173,14 @@ def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], d
         f"recorded/{model}/{name}": group for model, each in compared.items() for name, group in each.groups.items()
     }
     walks = {**{model: inputs[stage] for model, stage in MODELS.items()}, "recorded": recorded}
-    return groups, {
-        "recorded": {
-            "name": recorded.summary["name"],
-            "doubts": recorded.summary["doubts"],
-            "steps": {model: last_step(walk.summary) for model, walk in walks.items()},
-            "table3": {model: asdict(characteristics_of(walk)) for model, walk in walks.items()},
-            "differences": {model: each.summary for model, each in compared.items()},
-        }
+    summary = {
+        "name": recorded.summary["name"],
+        "doubts": recorded.summary["doubts"],
+        "steps": {model: last_step(walk.summary) for model, walk in walks.items()},
+        "table3": {model: asdict(characteristics_of(walk)) for model, walk in walks.items()},
+        "differences": {model: each.summary for model, each in compared.items()},
     }
+    return groups, {"recorded": summary}
 
 
 def characteristics_of(walk: Content) -> Characteristics:
@@ -236,9 +226,8 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
-        model = rigid_on_slope(
-            assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch
-        )
+        parts = assembly_of(config.walker, rigid=True)
+        model = rigid_on_slope(parts, config.gravity_m_s2, config.slope_rad, not at_touch)
         rigid = take_walk(add_drives(model, config), RIGID_TOLERANCES, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
@@ -311,10 +300,8 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
         row["recorded"] = recorded["recorded"]["table3"]["recorded"][symbol]
-    omissions = [*summary.pop("left_out"), *motion.left_out]
-    return Content(
-        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": omissions}
-    )
+    summary |= shared | recorded | {"left_out": [*summary.pop("left_out"), *motion.left_out]}
+    return Content({**groups, **motion.groups, **recorded_groups}, summary)
 
 
 def compare_with_paper(

@@ -222,9 +222,8 @@ class Judge:
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
-        verdict = verdict_on(
-            row.matlab, rigid.values(), Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
-        )
+        otherwise = Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
+        verdict = verdict_on(row.matlab, rigid.values(), otherwise)
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
         yield self.row(row.matlab, rigid, contact, verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)

@@ -308,10 +308,9 @@ class TuneRun:
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*UNCHANGED_START)
         quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
-        rows = map_in_order(
-            [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs
-        )
-        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
+        rows = [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance]
+        computed = map_in_order(rows, jobs)
+        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, computed, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
@@ -576,14 +575,12 @@ def map_group(tune: TuneRun) -> Group:
     factors = tune.gait_factors
     if factors is not None:
         attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
-    return Group(
-        {
-            swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
-            stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
-            **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
-        },
-        attrs,
-    )
+    variables = {
+        swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),
+        stance: Variable(cells.stance, (stance,), "1", factor.format("stance")),
+        **{name: Variable(values, (stance, swing), "1", text) for name, (values, text) in over.items()},
+    }
+    return Group(variables, attrs)
 
 
 def gait_group(gait: Cycle, scene: contact.ContactScene) -> Group:
@@ -591,12 +588,11 @@ def gait_group(gait: Cycle, scene: contact.ContactScene) -> Group:
     names = np.array([f"{text} ({unit})" for text, unit in coordinates], dtype=object)
     units = ", ".join(unit for _, unit in coordinates)
     pairs = ("coordinate", "along")
-    return Group(
-        {
-            "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
-            "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
-            "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
-            **numbered(gait.z.size, "multiplier", "number"),
-            **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
-        }
-    )
+    variables = {
+        "coordinate": Variable(names, ("coordinate",), "", "coordinate"),
+        "state": Variable(gait.z, ("coordinate",), units, "gait on the section"),
+        "derivative": Variable(gait.DP, pairs, "per unit of the coordinate", "derivative of the step map"),
+        **numbered(gait.z.size, "multiplier", "number"),
+        **real_and_imaginary("multiplier", gait.multipliers, ("multiplier",), "multiplier"),
+    }
+    return Group(variables)

@@ -248,11 +248,11 @@ def judge(case: Case, config: Config) -> CaseResult:
     second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
         short = start.repeated_case(case)
-        second = second_walk(
-            methods.method,
-            case.budget,
-            lambda method, budget: start.walk(short, replace(methods, method=method.name, budget=budget)),
-        )
+
+        def repeat(method: Method, budget: int) -> JudgedWalk:
+            return start.walk(short, replace(methods, method=method.name, budget=budget))
+
+        second = second_walk(methods.method, case.budget, repeat)
         for what, again in repeat_walks(start, config, short, second):
             findings += time_difference(what, walk, again, case, methods.rtol)
             differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected

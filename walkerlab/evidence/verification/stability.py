@@ -53,9 +53,8 @@ def run(
     problems = inputs["known-problems"]
     summary = summarise(cases, problems.summary["known"], [item for item in items if isinstance(item, Choice)])
     group = rows_group(cases, labels_of(CaseResult), "case", "number of the row")
-    return Content(
-        {"cases": group, "known": problems["known"]}, {**summary, "left_out": list(verification_omissions(config))}
-    )
+    summary["left_out"] = list(verification_omissions(config))
+    return Content({"cases": group, "known": problems["known"]}, summary)
 
 
 def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:

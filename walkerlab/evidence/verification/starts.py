@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from walkerlab.config.analyses import Case
 from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.schema import MidStep, state_of
+from walkerlab.errors import NoAnswer
 from walkerlab.evidence.verification.catalogue import pendulum_time
 from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, allowed_difference, finite
 from walkerlab.outcome import Outcome
@@ -31,7 +32,7 @@ from walkerlab.physics.orbits.fixed_point import RigidGait, find_gaits
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.stepping import ACCEPTED, RHS
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
+from walkerlab.scene.contact import ContactScene, scene_on_pads, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import first_step_length, rigid_walker
 
@@ -504,15 +505,12 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
         speed = walker.leg_length * max(abs(rate) for rate in state[len(state) // 2 :])
         energy = float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))
         return RigidStart(config, state, energy, walker)
-    pitch = length
-    if config.contact is not None and wants_own_pitch(config.contact):
-        contact = contact_gait(config, length, state).gait
-        if contact is None:
-            return None
-        pitch = float(contact.lengths_m.mean())
     behind = abs(float(swing_foot(walker, state)[1]))
-    asymmetry = 2.0 * (behind / pitch - 1.0) if walker.legs_differ and not isinstance(config.start, MidStep) else 0.0
-    scene = contact_scene(config, length, pitch, asymmetry)
+    asymmetry = 2.0 * (behind / length - 1.0) if walker.legs_differ and not isinstance(config.start, MidStep) else 0.0
+    try:
+        scene = scene_on_pads(config, length, state, asymmetry=asymmetry)
+    except NoAnswer:
+        return None
     y = start_state(scene, state)
     y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
     leg = config.walker.leg_length_m

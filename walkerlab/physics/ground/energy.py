@@ -18,7 +18,6 @@ from walkerlab.physics.ground.walker import (
 )
 from walkerlab.physics.kernels import kernel_part, matrix, vector
 from walkerlab.physics.mechanics import tree
-from walkerlab.physics.mechanics.tree import add_inertia, projections
 
 
 @kernel_part
@@ -29,7 +28,7 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
     total = 0.0
     omega = y[half + form.places : 2 * half]
     sines_cosines(form, y, s, c)
-    add_inertia(form, form.bodies, s, c, omega, M, r)
+    tree.add_inertia(form, form.bodies, s, c, omega, M, r)
     # About the centre of mass, the energies of translation and rotation add without a coupling term. A pinned form has
     # no translation.
     for i in range(form.places):
@@ -42,7 +41,7 @@ def potential_energy(form: GroundModel, y: Any) -> float:
     """Compute the potential energy of gravity (J), which is zero at the origin of the slope's frame."""
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
-    projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
+    tree.projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
     if form.places > 0:
         return tree.potential_energy(form, form.bodies, y[0], y[1], F, U)
     return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)

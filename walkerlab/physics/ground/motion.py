@@ -15,15 +15,7 @@ from walkerlab.physics.ground.walker import (
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.tree import (
-    add_gravity,
-    add_gravity_gradient,
-    add_inertia,
-    add_inertia_gradients,
-    factor_linked,
-    projections,
-    solve_linked,
-)
+from walkerlab.physics.mechanics import tree
 from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 
@@ -51,7 +43,7 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
     if along == 0.0 and normal == 0.0:
         return 0.0, 0.0
     F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    tree.projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
         # Virtual work: per unit rate of body k, the foot's lowest material point moves by rolling - U along the slope
         # and by F normal to it.
@@ -75,8 +67,8 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     # About the centre of mass gravity has no torque; `ground_derivative` adds its acceleration.
     if form.places == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-        projections(form.arm_x, form.arm_y, n, s, c, F, U)
-        add_gravity(form, n, F, U, r)
+        tree.projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        tree.add_gravity(form, n, F, U, r)
     along = 0.0
     normal = 0.0
     for foot in range(2):
@@ -84,9 +76,9 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
         along += force[0]
         normal += force[1]
     add_torques(system, y, r)
-    add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
-    factor_linked(form.E[0], n, M)
-    solve_linked(form.E[0], n, M, r)
+    tree.add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
+    tree.factor_linked(form.E[0], n, M)
+    tree.solve_linked(form.E[0], n, M, r)
     return along, normal
 
 
@@ -141,7 +133,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
     U = vector(BODY_VECTOR)
     p = form.places
     half = half_size(form)
-    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    tree.projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     along = push.along
     normal = push.upward
     if inside:
@@ -181,10 +173,10 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
     half = half_size(form)
     if p == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-        projections(form.arm_x, form.arm_y, n, s, c, F, U)
-        add_gravity_gradient(form, n, F, U, by_angle)
+        tree.projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        tree.add_gravity_gradient(form, n, F, U, by_angle)
     add_gradients(system, y, by_angle, by_rate)
-    add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
+    tree.add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 
 @jacobian.case(OnGround)
@@ -207,7 +199,7 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     for k in range(n):
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        solve_linked(form.E[0], n, M, by_torque[k])
+        tree.solve_linked(form.E[0], n, M, by_torque[k])
     for foot in range(2):
         add_foot_gradients(system, t, foot, s, c, y, J)
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])

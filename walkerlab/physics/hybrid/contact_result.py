@@ -24,14 +24,12 @@ from walkerlab.physics.ground.walker import (
     to_form,
     to_full,
 )
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_crossings import hip_height
 from walkerlab.physics.hybrid.contact_jumps import change_form
 from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
 from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples, new_tangent
 from walkerlab.physics.hybrid.contact_state import (
-    EVENT_ROWS,
-    HEIGHT,
-    PER_FOOT,
     JudgedGround,
     WalkState,
     material_along,
@@ -208,7 +206,7 @@ def walk_on(
     # Forms have states of different sizes, and each size needs a method with memory of that size. They share clock and
     # counts, so that they act as one method.
     by_size = {y.size: lead}
-    finder = finder_for(lead, EVENT_ROWS, walker.size)
+    finder = finder_for(lead, events.EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = share_counts(tolerances.new(y.size), lead.clock, lead.counts)
@@ -307,7 +305,7 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
     # The released foot is exactly at the surface, which is no touch.
-    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
+    walk_state.at_zero[foot * events.PER_FOOT + events.HEIGHT] = 1
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:

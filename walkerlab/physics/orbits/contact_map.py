@@ -73,6 +73,16 @@ class SectionStep(MappedStep):
     work: NDArray[np.int64]  # counts of right-hand-side evaluations, accepted steps, rejected steps and Jacobians
 
 
+@dataclass(frozen=True)
+class WalkerOnGround:
+    walker: ContactWalker
+    ground: JudgedGround
+
+
+def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
+    return replace(site, ground=site.ground._replace(terrain=terrain))
+
+
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
     # if only one leg has a knee, there are fewer where that leg stands
@@ -184,8 +194,7 @@ def stance_of(swing: int) -> int:
 
 
 def step_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
+    site: WalkerOnGround,
     tolerances: Tolerances,
     z: Floats,
     pitch_m: float,
@@ -195,14 +204,14 @@ def step_from_section(
     """Walk from section to section on pads of pitch `pitch_m`. The outcome is REJECTED if a push-off lasts beyond the
     section.
     """
-    laid = ground
+    walker = site.walker
     start = state_on_section(walker, z, stance)
     # The stance foot stands in the middle of a pad.
-    if ground.terrain.has_pads:
+    if site.ground.terrain.has_pads:
         foothold = feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
-        laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
-    walk_state = walk_state_on_section(walker, laid, start, 2, stance)
+        site = replace_terrain(site, checkerboard(pitch_m, lanes))
+    walk_state = walk_state_on_section(site, start, 2, stance)
     standing = float(walk_state.foothold[stance])
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
@@ -226,7 +235,7 @@ def step_from_section(
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
     advance, rose = (float(end[index] - start[index]) for index in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
-    half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
+    half = min(1.0, max(-1.0, 0.5 * spacing / site.ground.frame.leg_length))
     pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
     cut_off = stopped.time_s - walk_state.touch_time[0] < pulse
     return SectionStep(
@@ -248,18 +257,13 @@ def step_from_section(
 
 
 def walk_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    heights: Floats,
-    push: float,
-    stance: int = STANCE_FOOT,
+    site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float, stance: int
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
+    walker = site.walker
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
+    walk_state = walk_state_on_section(with_footholds(site, heights), start, steps + 1, stance)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
@@ -292,7 +296,7 @@ def walk_from_section(
     times = walk_state.touch_time[:touched]
     along = walk_state.touch_along[:touched]
     rises = np.diff(walk_state.touch_height[:touched])
-    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), rises)
+    angles = touch_angles(walker, site.ground.frame.leg_length, np.diff(along), rises)
     if differ:
         angles = np.array(landed[: angles.size])
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
@@ -315,27 +319,22 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 
 
 def sample_legs_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    heights: Floats,
-    times: Floats,
-    stance: int = STANCE_FOOT,
+    site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats, stance: int
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
+    walker = site.walker
     start = state_on_section(walker, z, stance)
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size, stance)
+    walk_state = walk_state_on_section(with_footholds(site, heights), start, heights.size, stance)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
     legs = [ANGLES + walker.legs[foot][0] for foot in (stance, 1 - stance)]
     return np.asarray(observer.samples.states[:, legs])
 
 
-def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+def with_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
     # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
     over = np.append(heights[0], heights) - heights[0]
-    return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
+    return replace_terrain(site, site.ground.terrain._replace(heights=over)) if over.any() else site
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
@@ -364,33 +363,21 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     return tuple(to_full(form, y, walker.size).tolist())
 
 
-def walk_state_on_section(
-    walker: ContactWalker, ground: JudgedGround, start: State, steps: int, stance: int = STANCE_FOOT
-) -> WalkState:
+def walk_state_on_section(site: WalkerOnGround, start: State, steps: int, stance: int) -> WalkState:
     """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
     swing = 1 - stance
-    walk_state = new_walk_state(walker, ground, stance, steps, start)
-    feet = feet_motion(walker.whole, start)
+    walk_state = new_walk_state(site.walker, site.ground, stance, steps, start)
+    feet = feet_motion(site.walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
     walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
-        ground.terrain, bool(walk_state.has_ground[swing]), False, True
+        site.ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
     # The swing foot is above the gap that follows the pad it left.
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
-    walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
+    walk_state.foothold[swing] = feet[stance].along - site.ground.frame.leg_length
     return walk_state
-
-
-@dataclass(frozen=True)
-class WalkerOnGround:
-    walker: ContactWalker
-    ground: JudgedGround
-
-
-def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
-    return replace(site, ground=site.ground._replace(terrain=terrain))
 
 
 def section_units(site: WalkerOnGround, stance: int) -> Floats:
@@ -459,7 +446,7 @@ class ContactMap(StepMap):
         pitch_m = site.ground.terrain.pitch
         stance = self._stance(swing)
         z_m = z * self._units[swing % 2]
-        return step_from_section(site.walker, site.ground, self.tolerances, z_m, pitch_m, derived, stance)
+        return step_from_section(site, self.tolerances, z_m, pitch_m, derived, stance)
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)
@@ -492,8 +479,8 @@ class ContactMap(StepMap):
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        scene = (site.walker, site.ground, endless)
-        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, self._stance(swing))
+        start = z * self._units[swing % 2]
+        walk = walk_from_section(site, endless, start, heights_m, push_N_s, self._stance(swing))
         # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
         # units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
@@ -508,7 +495,7 @@ class ContactMap(StepMap):
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
         start = z * self._units[0]
-        return sample_legs_from_section(site.walker, site.ground, endless, start, heights_m, times, self._stance(0))
+        return sample_legs_from_section(site, endless, start, heights_m, times, self._stance(0))
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         stride = walk_steps(self, z, p, self.stride, derived=False)
@@ -549,9 +536,8 @@ class AdaptivePads(Stepper):
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         index = swing % len(self.pitches_m)
-        walker = self.walker_at(p)
-        pitch_m = self.pitches_m[index]
-        step = step_from_section(walker, self.ground, self.tolerances, z, pitch_m, derived, stance_of(swing))
+        site = WalkerOnGround(self.walker_at(p), self.ground)
+        step = step_from_section(site, self.tolerances, z, self.pitches_m[index], derived, stance_of(swing))
         if step.outcome is Outcome.WALKED:
             self.pitches_m[index] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m
         return step

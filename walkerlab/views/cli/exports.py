@@ -339,6 +339,8 @@ class Film:
 
 BOTH = "both"
 """Name of a film that shows both models in one picture."""
+MAX_GIF_RATE = 50
+"""Browsers show a picture of less than 20 ms for 100 ms."""
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
@@ -362,6 +364,8 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     ffmpeg = shutil.which("ffmpeg")
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
+    if kind == "gif" and film.rate > MAX_GIF_RATE:
+        raise ConfigError(f"browsers slow a GIF above {MAX_GIF_RATE} frames per second.", "Lower --rate, or use .mp4.")
     # Imported here: a file that cannot be written is refused before drawing code is loaded.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
@@ -394,8 +398,10 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
+    # A GIF counts hundredths of a second. Rounded ends of pictures keep the whole film in time.
+    durations_ms = 10 * np.diff(np.round(100 * np.arange(len(frames) + 1) / rate)).astype(int)
     file = io.BytesIO()
-    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
+    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=durations_ms.tolist(), loop=0)
     return file.getvalue()
 
 

@@ -18,15 +18,8 @@ RunArgument = Annotated[
 ITEM_EXAMPLES = (
     "figure-07 or 7, steps, trajectory, model, or a table by its caption; any other word lists the run's items"
 )
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="File to write; its ending gives the format. Default: named after the run or the config, in this folder.",
-    ),
-]
+OUTPUT_HELP = "File to write; its ending gives the format. Default: named after the run or the config, in this folder."
+Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help=OUTPUT_HELP)]
 FIRST_WALK = "default: contact-sim, or simulate if that has not run"
 
 

@@ -33,9 +33,8 @@ def draw_unit_circle(multipliers: Sequence[complex]) -> Figure:
             colour = BLUE if abs(multiplier) < 1.0 else VERMILLION
             axes.plot(multiplier.real, multiplier.imag, "o", color=colour, markeredgecolor=BLACK)
         extent = 1.1 * max(1.0, *map(abs, multipliers))
-        axes.set(
-            xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal", xlabel="real part", ylabel="imaginary part"
-        )
+        ends = (-extent, extent)
+        axes.set(xlim=ends, ylim=ends, aspect="equal", xlabel="real part", ylabel="imaginary part")
         axes.set_title(f"Multipliers; the largest has magnitude {max(map(abs, multipliers)):.3g}")
         settle(figure)
     return figure

@@ -224,13 +224,12 @@ def contradicted_priors(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, 
 
 
 def describe_nuisances(nuisances: Mapping[str, Mapping[str, float]]) -> str:
-    return capitalised(
-        join_words(
-            f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
-            f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
-            for name, row in nuisances.items()
-        )
+    phrases = (
+        f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
+        f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
+        for name, row in nuisances.items()
     )
+    return capitalised(join_words(phrases))
 
 
 def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
