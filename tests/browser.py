@@ -1,4 +1,4 @@
-"""A headless Chromium, spoken to over a pipe in its own protocol: nothing to install but the browser."""
+"""Control a headless Chromium over a pipe by its own protocol, which needs nothing but the browser."""
 
 import base64
 import contextlib

@@ -1,4 +1,4 @@
-"""`walkerlab explore` as a process, and how it is asked."""
+"""Run `walkerlab explore` as a process, and send requests to it."""
 
 import contextlib
 import http.client

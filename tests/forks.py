@@ -1,4 +1,4 @@
-"""Programs in processes forked off one that has the libraries loaded: as apart as any, without a second of imports.
+"""Run programs in forks of a process that has loaded the libraries. They are separate, and save a second of imports.
 
 Run as a script it is that one: it forks for every line of JSON that it reads, and answers with the exit code.
 """

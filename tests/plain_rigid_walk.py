@@ -1,4 +1,4 @@
-"""A rigid walk over footholds of any height by a library's integrator, event by event, in Python."""
+"""Simulate a rigid walk over footholds of any height in Python, event by event, with a library's integrator."""
 
 import numpy as np
 from scipy.integrate import solve_ivp

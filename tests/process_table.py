@@ -1,4 +1,4 @@
-"""Processes by the kernel's own table, for tests that look whether any is left."""
+"""Read the kernel's table of processes, so that tests can check that none is left."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What stages store of a small run of the paper's walker: the results that other tests' results derive from."""
+"""Results that stages store of a small run of the paper's walker. Results for other tests are derived from them."""
 
 import functools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The rigid model's functions for states in tuples, in Python, where scratch that is read unwritten is no number."""
+"""The rigid model's functions in Python, for states in tuples. Scratch memory begins as NaN."""
 
 import numpy as np
 from scipy.integrate import solve_ivp

@@ -1,4 +1,4 @@
-"""The package from Python."""
+"""Tests of the Python interface."""
 
 import ast
 import copy

@@ -1,4 +1,4 @@
-"""Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
+"""Check the architecture: imports go down through the layers, kernels import only kernels, configs have one source."""
 
 import ast
 import functools

@@ -1,4 +1,4 @@
-"""README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
+"""Check README and docs: links lead somewhere, commands are accepted, and tables and outputs are those of the tool."""
 
 import base64
 import json

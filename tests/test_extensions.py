@@ -1,4 +1,4 @@
-"""Extensions of other packages: the example of the docs and faulty ones, installed as pip leaves them on the path."""
+"""Tests of extensions by other packages: the example of the docs, and faulty ones, installed as pip does."""
 
 import json
 import os

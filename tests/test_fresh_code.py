@@ -1,4 +1,4 @@
-"""An edited function never runs stale: compiled code belongs to the sources that it was made of."""
+"""Check that an edited function never runs outdated code, because compiled code is stored with its sources' digest."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What compiled functions may do, and what they may not."""
+"""Tests of what compiled functions can do and what they must not do."""
 
 import importlib
 import os

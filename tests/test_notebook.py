@@ -1,4 +1,4 @@
-"""The notebook of the tutorial runs from its first cell to its last, and says what its text says of it."""
+"""Check that the notebook of the tutorial runs from its first cell to its last and gives what its text says."""
 
 import json
 from pathlib import Path

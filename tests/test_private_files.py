@@ -1,4 +1,4 @@
-"""Compiled code and pickles are run when they are loaded, so nobody else may have written them."""
+"""Check that compiled code and pickles, which run when loaded, are loaded only if no other user can write them."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""The whole process of a warm `walkerlab simulate`, against one that does no more than it must: what each loads."""
+"""Compare what the whole process of a warm `walkerlab simulate` loads with the minimum."""
 
 import runpy
 import subprocess

@@ -1,4 +1,4 @@
-"""Workers: what they are given comes back, what happens to them is told, and none is left."""
+"""Tests of workers: they return what they get, failures are reported, and no worker is left."""
 
 import os
 import signal

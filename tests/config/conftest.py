@@ -1,4 +1,4 @@
-"""Fixtures of the config tests: a place to write a config to, and the message it is refused with."""
+"""Fixtures of the config tests: a folder for configs, and the message with which a config is rejected."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

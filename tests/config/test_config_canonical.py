@@ -1,4 +1,4 @@
-"""What a stage is given of a config, and what its key is made of."""
+"""Tests of the part of a config that each stage gets, and of the key made from it."""
 
 from __future__ import annotations
 

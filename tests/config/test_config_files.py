@@ -1,4 +1,4 @@
-"""Whatever a file is or holds, it is a config or it is refused in words."""
+"""Check that any file is either read as a config or rejected with a message."""
 
 import os
 import tracemalloc

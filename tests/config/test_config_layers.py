@@ -1,4 +1,4 @@
-"""A file over what it extends, and `--set` and `--strides` over both."""
+"""Tests of precedence: a file over the config that it extends, and `--set` and `--strides` over both."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""From a file, `extends`, `--set` and `--strides` to one config, or to a refusal that says where and why."""
+"""Tests of loading: file, `extends`, `--set` and `--strides` give a config, or an error that says where and why."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Run identity: a changed config runs beside the unchanged one, in a folder that is named after the change."""
+"""Check that the results of a changed config go to a folder named after the change."""
 
 import re
 from pathlib import Path

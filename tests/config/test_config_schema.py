@@ -1,4 +1,4 @@
-"""What the schema admits and refuses; every bound is checked at both of its sides."""
+"""Check what the schema accepts and rejects, on both sides of every bound."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What drives a walker: where it is refused, and in which words."""
+"""Tests of the drives in configs, and of the messages with which they are rejected."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A small reader of ADAMS/Solver datasets (.adm), written from the format's description alone.
+"""Read ADAMS/Solver datasets (.adm). This small reader is written from the description of the format alone.
 
 It rebuilds parts, markers, joints and force expressions of planar models (motion in the x-y plane of the ground),
 evaluates the expressions as they are written, and integrates with SciPy. Every part has three coordinates (x, y of

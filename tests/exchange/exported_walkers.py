@@ -1,4 +1,4 @@
-"""Walkers to export, each with its rigid gait: built-in ones and random ones of every kind that is exported."""
+"""Walkers to export, each with its rigid gait: built-in ones, and random ones of every kind that can be exported."""
 
 from functools import cache
 from pathlib import Path

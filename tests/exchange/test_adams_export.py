@@ -1,4 +1,4 @@
-"""Exported ADAMS models define our walker: rebuilt from their text alone they have its masses, forces and walk."""
+"""Check that exported ADAMS models, rebuilt from their text, have our walker's masses, forces and walk."""
 
 import re
 

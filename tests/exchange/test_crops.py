@@ -1,4 +1,4 @@
-"""Heel strikes of recordings that are cut anywhere, within stated errors: a sample of scripts/crop_campaign.py."""
+"""Check heel strikes of cut recordings against their stated errors: a sample of scripts/crop_campaign.py."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""docs/exchange.md: its downloads are today's models, and its Python runs."""
+"""Check that the downloads of docs/exchange.md are current and that its Python runs."""
 
 import re
 from pathlib import Path

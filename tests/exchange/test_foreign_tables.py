@@ -1,4 +1,4 @@
-"""Tables as spreadsheets, tracking programs and other countries write them."""
+"""Read tables as spreadsheets, tracking programs and other countries write them."""
 
 import codecs
 import os

@@ -1,4 +1,4 @@
-"""Heel strikes of recordings that are cut anywhere, noisy, swapped, turned or off."""
+"""Find heel strikes in recordings that are cut anywhere, noisy, or have swapped, rotated or biased angles."""
 
 import functools
 import math

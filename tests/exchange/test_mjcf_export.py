@@ -1,4 +1,4 @@
-"""Exported MJCF: it compiles silently, carries the walker at the law's depth, and walks as our contact model does."""
+"""Check that exported MJCF compiles without warnings, and sinks in and walks as our contact model does."""
 
 import importlib.util
 import shutil

@@ -1,4 +1,4 @@
-"""Recordings whose slope or sensors are off: the rates' jumps say where heel strikes are."""
+"""Find heel strikes by jumps of the rates in recordings with an unknown slope or offset."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Files written by the programs that people use, by their own functions, where they are installed."""
+"""Read files written by the programs that people use, if these are installed."""
 
 import datetime
 import math

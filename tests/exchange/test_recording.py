@@ -1,4 +1,4 @@
-"""Files that other programs and people write, read into columns and quantities."""
+"""Read columns and quantities of files that other programs and people write."""
 
 import math
 

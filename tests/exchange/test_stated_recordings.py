@@ -1,4 +1,4 @@
-"""What a file does not say is stated by keys: tilt, direction, belt, frame rate, part, likelihood, signs, constants."""
+"""Tests of keys for what a file does not say: tilt, direction, belt, frame rate, part, likelihood, signs, constants."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Long campaigns: run with `--full` only, kept once there, and gone on with where a run was cut off."""
+"""Tests of long campaigns: only with `--full`, kept when complete, and resumed after an interruption."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a config with a contact block becomes, and where its walker starts."""
+"""Tests of the scene that a config with a contact block gives, and of its start."""
 
 import functools
 import math

@@ -1,4 +1,4 @@
-"""Identified walkers with doubtful errors: noise that the floor hides, outliers, contradictions, other disturbances."""
+"""Tests of identified walkers with doubtful errors: hidden noise, outliers, and contradictions."""
 
 import re
 import tracemalloc

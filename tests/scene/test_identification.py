@@ -1,4 +1,4 @@
-"""Parameters identified from synthetic walks, and walks that no walker explains."""
+"""Identify parameters from synthetic walks, and recognise walks that no walker explains."""
 
 import runpy
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Each reduced scene gives the numbers of the full one with the part set to nothing."""
+"""Check that each reduced scene gives the numbers of the full one without the omitted part."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Configs with `leg_2`: the second leg that they describe, its contact walk, and what needs equal legs."""
+"""Tests of configs with `leg_2`: the second leg, its contact walk, and the stages that need equal legs."""
 
 import math
 

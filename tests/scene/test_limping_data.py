@@ -1,4 +1,4 @@
-"""Legs that differ in measured walks, which a plain integration of both swings makes."""
+"""Identify legs that differ from walks by a plain integration of both swings."""
 
 from functools import cache
 from pathlib import Path

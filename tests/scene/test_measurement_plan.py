@@ -1,4 +1,4 @@
-"""Planned measurements: expected errors against a dense normal distribution, and how they change with what is known."""
+"""Tests of planned measurements: expected errors compared with a dense normal distribution, and what reduces them."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A law of friction says what is asked of it itself, so that one of a user's own is treated as ADAMS's is."""
+"""Check that a user's own friction law is treated as ADAMS's is, from what it declares."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Every number of the schema, on every type of walker, is a parameter or is refused in words."""
+"""Check that every number of the schema is a parameter, or is rejected with a reason, for every type of walker."""
 
 from pathlib import Path
 

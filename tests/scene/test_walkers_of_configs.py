@@ -1,4 +1,4 @@
-"""Walkers described in YAML: types, limits, own parts, and what is refused."""
+"""Tests of walkers in YAML: types, limits, parts, and rejected descriptions."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""The paper's compass and the kneed walker on their ground, as engines get them."""
+"""The paper's compass and the kneed walker on their ground, in the form that engines get."""
 
 from functools import cache
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Error against run time on the rigid scene, a few methods: what the rows say, and what is computed from them."""
+"""Tests of the stage `accuracy`: errors and run times of a few methods on the rigid scene, and its conclusions."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Every engine that is installed: its swing converges to ours, its contact carries what it should, our law is ours."""
+"""Check every installed engine: its swing converges to ours, and both contact laws carry the right load."""
 
 import importlib
 from functools import cache

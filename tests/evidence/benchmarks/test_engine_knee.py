@@ -1,4 +1,4 @@
-"""The rigid model's swing with a free knee, its limbs' masses off their axes, by every engine that is installed."""
+"""Compare the swing with a free knee in every installed engine with that of the rigid model."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What engines are told of a walker, and how a walk is judged from outside: no engine is needed for this."""
+"""Tests of the models that engines get, and of the judgement of their walks. They need no engine."""
 
 from pathlib import Path
 

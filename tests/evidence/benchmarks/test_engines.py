@@ -1,4 +1,4 @@
-"""The stage that walks in other engines: what is told of rows, and of engines that are not there."""
+"""Tests of the stage `engines`: its messages on rows, and on engines that are not installed."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Gaits of kneed walkers with planted mistakes, by an integration of their own.
+"""Gaits of kneed walkers with planted mistakes, by an integration that does not use the package.
 
 The equations are Lagrange's, written out by hand for three bodies and round feet. With a locked knee, a leg is one
 body, so the heel strike is that of `mistaken_walks`.

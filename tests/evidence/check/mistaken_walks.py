@@ -1,4 +1,4 @@
-"""Gaits of straight-legged walkers with planted mistakes, by an integration of their own.
+"""Gaits of straight-legged walkers with planted mistakes, by an integration that does not use the package.
 
 It shares nothing with the code that judges: the equations are Lagrange's, written out by hand for a walker with round
 feet, and the heel strike balances the momenta of three bodies with vectors.

@@ -1,4 +1,4 @@
-"""Printed gaits beside right ones: digits, conventions, balances, and the command."""
+"""Tests of `walkerlab check`: digits, conventions, balances, and the command."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Planted mistakes are named, right gaits are reproduced, and unknown mistakes stay unexplained."""
+"""Check that planted mistakes are named, right gaits reproduced, and unknown mistakes left unexplained."""
 
 import random
 from itertools import islice

@@ -1,4 +1,4 @@
-"""Appendix A written down once more, in NumPy and SciPy: what the errata are checked against."""
+"""Appendix A written once more, in NumPy and SciPy, to check the errata."""
 
 import numpy as np
 from scipy.integrate import solve_ivp

@@ -1,4 +1,4 @@
-"""What the paper prints, against Lagrange's equations derived here, and both against the compiled physics."""
+"""Compare the printed equations with Lagrange's, derived here, and both with the compiled physics."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The comparison of both models, from results laid out as the other stages lay them out."""
+"""Tests of the comparison of both models, with results in the layout of the other stages."""
 
 import json
 

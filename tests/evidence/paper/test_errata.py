@@ -1,4 +1,4 @@
-"""The errata of the paper, measured again by other routes."""
+"""Measure the errata of the paper again, by other methods."""
 
 from fractions import Fraction
 

@@ -1,4 +1,4 @@
-"""The printed numbers: how they are read, when a value agrees with one, and what verdicts follow."""
+"""Tests of printed numbers: how they are read, when a value agrees with one, and which verdicts follow."""
 
 import re
 from dataclasses import replace

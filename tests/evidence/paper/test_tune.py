@@ -1,4 +1,4 @@
-"""The adjustment: not needed on the paper's contact, found where it is, and words where there is none."""
+"""Tests of the adjustment: not needed on the paper's contact, found where it exists, and reported where it does not."""
 
 import functools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The maps: cells are what the walks say, a run that was cut off goes on, and figures are drawn of them."""
+"""Tests of the maps: cells agree with the walks, an interrupted run continues, and figures are drawn."""
 
 import numpy as np
 import pytest

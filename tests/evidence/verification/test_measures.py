@@ -1,4 +1,4 @@
-"""The measures themselves notice what is wrong."""
+"""Check that the measures notice errors."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Momentum on compliant ground: it balances, and what is a little wrong does not."""
+"""Check that momentum balances on compliant ground, and that slightly wrong walks violate the balance."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Ordinary methods are shown as they are: what they say, and what they do not."""
+"""Tests of ordinary methods: which failures they report, and which they do not."""
 
 import numpy as np
 import pytest

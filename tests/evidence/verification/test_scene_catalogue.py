@@ -1,4 +1,4 @@
-"""A scene's own extremes: what they cover for which walker, and that measures hold for walkers of every kind."""
+"""Tests of the extreme cases of a scene: their range for each walker, and the measures for every kind of walker."""
 
 from pathlib import Path
 

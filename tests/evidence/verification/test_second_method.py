@@ -1,4 +1,4 @@
-"""A case is walked by another method too: by which, how far both may be apart, and what is said if there is none."""
+"""Tests of the second method for a case: the choice, the allowed difference, and the message if there is none."""
 
 from types import SimpleNamespace
 

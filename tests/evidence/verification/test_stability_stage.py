@@ -1,4 +1,4 @@
-"""The stage: what it stores and says, the same with one and with two processes, and cases of one's own."""
+"""Tests of the stage `stability`: its results with one and two processes, and a user's own cases."""
 
 from dataclasses import asdict, replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Walkers on compliant ground for the tests of their physics, and states of them put down by hand."""
+"""Walkers on compliant ground, and states of them placed by hand, for tests of their physics."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A ball foot in the ground: where the force acts, what it does to the energy, and its exact derivatives."""
+"""Tests of a ball foot in the ground: point of action of the force, energy, and exact derivatives."""
 
 import ground_walkers as ground
 import numpy as np

@@ -1,4 +1,4 @@
-"""The forms of a walker: one whose locked thigh and shank are one body moves as the one that holds them together."""
+"""Check that a locked knee makes the same motion in both forms: as one body, and as two that are held together."""
 
 import numpy as np
 import pytest

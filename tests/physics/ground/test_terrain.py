@@ -1,4 +1,4 @@
-"""Pads in lanes, and the plane that lets scuffing feet through."""
+"""Tests of pads in lanes, and of the plane that lets scuffing feet through."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Walking on compliant ground as one would write it in an afternoon: the rules of docs/theory.md, and nothing else.
+"""Walk on compliant ground by the rules of docs/theory.md, in the simplest possible code.
 
 Masses on levers from the hip, Newton's equations with multipliers for whatever is held, Runge-Kutta's classical method
 with one step for everything, shorter the faster the ground reacts, events by halving that step. It knows nothing of the

@@ -1,4 +1,4 @@
-"""Differences of two walks: in time, in phase, and of their orbits."""
+"""Tests of the differences of two walks: in time, in phase, and of their orbits."""
 
 from dataclasses import replace
 

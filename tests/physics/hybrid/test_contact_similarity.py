@@ -1,4 +1,4 @@
-"""What does not matter to a walk on compliant ground: place, leg, and the units it is measured in."""
+"""Check that place, leg and units make no difference to a walk on compliant ground."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Walking on compliant ground: what was measured of this walker by other programs, and what any right one must do."""
+"""Compare walks on compliant ground with measurements by other programs and with laws that hold for any walk."""
 
 import math
 

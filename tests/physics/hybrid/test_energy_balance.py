@@ -1,4 +1,4 @@
-"""A walk whose energy balance does not close is no answer, whoever asked for it; ladders of methods may err."""
+"""Check that walks without energy balance are rejected everywhere, except from methods under test."""
 
 import contact_walks
 import numpy as np

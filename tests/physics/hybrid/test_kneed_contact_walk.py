@@ -1,4 +1,4 @@
-"""The kneed walker on plane compliant ground: what another program measured, momentum, energy, a plain integration."""
+"""Compare the kneed walker on compliant ground with another program, balances and a plain integration."""
 
 import contact_walks
 import numpy as np

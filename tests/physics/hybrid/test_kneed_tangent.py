@@ -1,4 +1,4 @@
-"""How a step of a kneed walker on compliant ground changes with its start: exact derivatives against differences."""
+"""Compare derivatives of a kneed walker's step on compliant ground with differences."""
 
 import numpy as np
 import pytest

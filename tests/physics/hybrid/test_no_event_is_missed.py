@@ -1,4 +1,4 @@
-"""Events that lie close together are all found, on every terrain; the right answers are a plain integration's."""
+"""Check that events close together are all found on every terrain, against a plain integration."""
 
 from pathlib import Path
 

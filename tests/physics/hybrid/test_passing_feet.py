@@ -1,4 +1,4 @@
-"""Which foot the ground carries once the feet have passed each other, either way: in the air, in the ground, on it."""
+"""Check which foot the ground carries after feet have passed each other, in the air, in the ground, or on it."""
 
 import numpy as np
 import pytest

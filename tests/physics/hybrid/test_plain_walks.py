@@ -1,4 +1,4 @@
-"""Random contact walks against the plain integration: a few of scripts/contact_campaign.py."""
+"""Compare random contact walks with the plain integration: a few of scripts/contact_campaign.py."""
 
 import importlib.util
 import sys

@@ -1,4 +1,4 @@
-"""The push-off's pulse on compliant ground: values known, derivatives, energy, and its limit, the rigid impulse."""
+"""Tests of the push-off on compliant ground: known values, derivatives, energy, and the limit of a rigid impulse."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Walks in lanes: the same fates, steps and heel strikes as one by one at a tight tolerance, falls among them."""
+"""Check that walks in lanes have the same ends, steps and heel strikes as one by one at a tight tolerance."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""Walks of the rigid model against a reference agreed by two tools, and against SciPy with events of its own."""
+"""Compare rigid walks with a reference on which two tools agree, and with SciPy, which has events of its own."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Walks over footholds of different heights: against a library's integrator, differences, energy, and each other."""
+"""Compare walks over footholds of different heights with a library's integrator, differences and energy."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Torques at the hip and the push-off, by a route that does not use them: random walkers mass by mass."""
+"""Compare hip torques and the push-off of random walkers with equations written mass by mass."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Random walkers of each type: energy, momentum, mirror image, scale, and parts against types; nothing is compiled."""
+"""Check energy, momentum, mirror images and scaling of random walkers of each type, without compiling."""
 
 from dataclasses import replace
 

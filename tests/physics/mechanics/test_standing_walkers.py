@@ -1,4 +1,4 @@
-"""Walkers on one foot against Lagrange's equations and sums over their masses, both written down from positions."""
+"""Compare walkers on one foot with Lagrange's equations and with sums over their masses."""
 
 import numpy as np
 import pytest

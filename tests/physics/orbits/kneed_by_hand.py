@@ -1,4 +1,4 @@
-"""A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy alone.
+"""A step of a kneed walker whose torso bisects its legs, by Lagrange's equations and SciPy alone.
 
 Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points, perhaps ahead
 of the shank's line. Bodies: swing

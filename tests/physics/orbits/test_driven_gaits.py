@@ -1,4 +1,4 @@
-"""Gaits of driven walkers: published ones, those of the level, and passive gaits that torques turn."""
+"""Tests of driven gaits: published ones, gaits on the level, and passive gaits changed by torques."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Families of gaits: flips by another route, cascades, folds, and what is said where a branch ends."""
+"""Tests of families of gaits: flips by another method, cascades, folds, and the reported ends of branches."""
 
 from functools import cache
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Gaits against numbers known from elsewhere, and what every search must hold to."""
+"""Compare gaits with numbers known from elsewhere, and check the rules of every search."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor

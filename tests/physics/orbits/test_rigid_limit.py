@@ -1,4 +1,4 @@
-"""Orders and limits of series that are known exactly, and what a setting changes."""
+"""Tests of orders and limits of series that are known exactly, and of the effect of settings."""
 
 from dataclasses import replace
 from pathlib import Path

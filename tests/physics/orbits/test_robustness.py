@@ -1,4 +1,4 @@
-"""Sensitivity norms, largest steps and rough ground against published values, brute sums and theory; gradients."""
+"""Compare sensitivity norms, largest steps and rough ground with published values, sums and theory."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Derivatives of the step maps, from variational equations, against differences of the maps; and Newton with them."""
+"""Compare derivatives of the step maps, by variational equations, with differences, and use them in Newton's method."""
 
 from itertools import pairwise
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Conditions on a Runge-Kutta tableau, one for each rooted tree; Butcher; Hairer, Norsett, Wanner I, section II.2."""
+"""Order conditions of a Runge-Kutta tableau, one for each rooted tree (Butcher; Hairer, Norsett, Wanner I, II.2)."""
 
 import math
 from functools import cache

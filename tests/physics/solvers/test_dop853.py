@@ -1,4 +1,4 @@
-"""DOP853: its tableau, the orders it shows, a published orbit, and SciPy's version of it."""
+"""Tests of DOP853: its tableau, its orders, a published orbit, and SciPy's version of it."""
 
 import math
 from typing import NamedTuple

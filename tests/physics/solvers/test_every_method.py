@@ -1,4 +1,4 @@
-"""What holds for every method of the registry; a new one is covered as soon as it is listed."""
+"""Tests of all methods in the registry. A new one is tested as soon as it is listed."""
 
 import math
 from functools import cache

@@ -1,4 +1,4 @@
-"""Products and sums rounded once."""
+"""Tests of products and sums that are rounded only once."""
 
 from fractions import Fraction
 

@@ -1,4 +1,4 @@
-"""Numbers in lanes: what is compiled for floats means the same, lane by lane."""
+"""Check that code compiled for lanes does in each lane what it does for a float."""
 
 import math
 import subprocess

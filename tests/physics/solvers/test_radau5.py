@@ -1,4 +1,4 @@
-"""Radau IIA: its stability function, the orders it shows, published stiff problems, and SciPy's version of it."""
+"""Tests of Radau IIA: its stability function, its orders, published stiff problems, and SciPy's version of it."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""Published stiff problems, with every method of the registry that is meant for such."""
+"""Solve published stiff problems with every method of the registry that is meant for them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The tableau of every Runge-Kutta method of the registry fulfils the conditions of its order, and no more."""
+"""Check that every tableau in the registry fulfils the conditions of its order, and not those of the next one."""
 
 import numpy as np
 import pytest

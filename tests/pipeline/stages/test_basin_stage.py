@@ -1,4 +1,4 @@
-"""The stage basin: shares, a run that is cut off, any number of processes, the contact model, and what it refuses."""
+"""Tests of the stage `basin`: shares, interrupted runs, processes, the contact model, and rejected questions."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The contact-sim stage: what it stores of a walk on compliant ground, and what it says when there is none."""
+"""Tests of the stage `contact-sim`: its results, and its messages without a walk on compliant ground."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The stage `continuation`: what it stores, in which unit, and which questions it turns away."""
+"""Tests of the stage `continuation`: its results, their units, and the questions that it rejects."""
 
 import math
 import re

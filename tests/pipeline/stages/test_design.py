@@ -1,4 +1,4 @@
-"""The design stage: optima against brute grids, bounds kept, questions refused, and the config that it ends in."""
+"""Tests of the stage `design`: optima compared with grids, bounds, rejected questions, and the config written."""
 
 import json
 from pathlib import Path

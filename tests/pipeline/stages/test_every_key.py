@@ -1,4 +1,4 @@
-"""Every number of every built-in walker, in every stage that takes a key: it is followed, or refused in words."""
+"""Check that each stage that takes a key follows every number of every built-in walker, or explains why not."""
 
 from dataclasses import replace
 from fnmatch import fnmatch

@@ -1,4 +1,4 @@
-"""The identify stage: parameters recovered from measured walks, misfits recognised, damaged questions refused."""
+"""Tests of the stage `identify`: recovered parameters, recognised misfits, and rejected questions."""
 
 import json
 from pathlib import Path

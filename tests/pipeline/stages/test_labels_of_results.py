@@ -1,4 +1,4 @@
-"""Units stand in labels, and some in names as well: they have to be the same."""
+"""Check that the unit in a name is the unit in the label."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Walks recorded elsewhere, read as files and compared: round trips, and 300 damaged files."""
+"""Read and compare walks recorded elsewhere: round trips, and 300 damaged files."""
 
 import contextlib
 import functools

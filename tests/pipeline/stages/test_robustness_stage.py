@@ -1,4 +1,4 @@
-"""The robustness stage: what it answers, keeps and refuses."""
+"""Tests of the stage `robustness`: its answers, its stored results, and the questions that it rejects."""
 
 import json
 from pathlib import Path

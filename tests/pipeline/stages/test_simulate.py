@@ -1,4 +1,4 @@
-"""The simulate stage: physical legs, what outputs ask for, and outcomes."""
+"""Tests of the stage `simulate`: physical legs, requested outputs, and outcomes."""
 
 import json
 import math

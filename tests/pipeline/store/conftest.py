@@ -1,4 +1,4 @@
-"""A content that uses all there is, and what goes with it into a file."""
+"""A content that uses all features of the format, and the attributes of its file."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Checkpoint of a result: what is kept survives, what was cut short or belongs to another result does not."""
+"""Tests of checkpoints: complete entries survive; incomplete ones and those of another result do not."""
 
 import math
 

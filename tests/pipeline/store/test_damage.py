@@ -1,4 +1,4 @@
-"""Files that are not what they say: refused with a reason, without a traceback and without a large allocation."""
+"""Check that damaged files are rejected with a reason, without a traceback and without large allocations."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""What Octave, NCO, xarray and h5py make of artifacts, and what this version makes of older ones."""
+"""Read artifacts with Octave, NCO, xarray and h5py, and older artifacts with this version."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What a sweep asks."""
+"""Tests of a sweep's question: its points, stages and keys."""
 
 import numpy as np
 import pytest

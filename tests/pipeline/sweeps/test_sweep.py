@@ -1,4 +1,4 @@
-"""A sweep of quick points: what is computed, what is taken over, what is stored."""
+"""Tests of a sweep with quick points: which are computed, which are reused, and what is stored."""
 
 import csv
 import io

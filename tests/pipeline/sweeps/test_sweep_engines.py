@@ -1,4 +1,4 @@
-"""Workers that die, on this machine, on Dask and as jobs; what is left is there and the guilty point is told."""
+"""Kill workers on this machine, on Dask and in jobs; the other points are computed, and the fatal one is named."""
 
 import contextlib
 import os

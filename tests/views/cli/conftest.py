@@ -1,4 +1,4 @@
-"""The command line in processes of its own: of the real pipeline and of the toy one."""
+"""Fixtures that run the command line, of the real pipeline and of the toy one, in separate processes."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Commands that begin, repeat and remove runs, and how commands end that are cut short."""
+"""Tests of commands that start, repeat and remove runs, and of interrupted commands."""
 
 import json
 import os

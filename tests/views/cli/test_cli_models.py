@@ -1,4 +1,4 @@
-"""`walkerlab export RUN model` in a process of its own."""
+"""Tests of `walkerlab export RUN model` in a separate process."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Workers that are killed while a command waits for them: an answer that did not come, not a bug."""
+"""Check that killing workers makes a command end without an answer, but not report a bug."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Runs as configs: what `-c` names, where that runs, and that no result of another config is overwritten."""
+"""Tests of runs as configs: what `-c` accepts, where results go, and that none of another config is overwritten."""
 
 import json
 import os

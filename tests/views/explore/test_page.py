@@ -1,4 +1,4 @@
-"""The page of `walkerlab explore` in a real browser: dragged, typed, searched, gone back in, saved, and left alone."""
+"""Use the page of `walkerlab explore` in a real browser: drag, type, search, go back, save, and leave it alone."""
 
 import itertools
 

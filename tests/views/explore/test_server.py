@@ -1,4 +1,4 @@
-"""`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
+"""Tests of `walkerlab explore` as a process: its numbers are those of the command, and errors have messages."""
 
 import contextlib
 import http.client

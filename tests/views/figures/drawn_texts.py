@@ -1,4 +1,4 @@
-"""What a renderer is told to write, and where."""
+"""Texts that a renderer gets, and their places."""
 
 import pytest
 from matplotlib.text import Text

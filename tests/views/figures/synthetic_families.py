@@ -1,4 +1,4 @@
-"""A family of gaits made by hand: a gait of one step that doubles its period at a slope of 4."""
+"""A family of gaits set by hand: a gait of one step that doubles its period at a slope of 4."""
 
 import numpy as np
 from synthetic_walks import stored

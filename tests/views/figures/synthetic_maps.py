@@ -1,4 +1,4 @@
-"""Maps of stability made by hand, laid out by the stage itself."""
+"""Stability maps with values set by hand, in the layout of the stage."""
 
 from synthetic_walks import stored
 

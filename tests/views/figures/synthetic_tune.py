@@ -1,4 +1,4 @@
-"""What `tune` stores, made by hand as far as figures need it: walks from its starts, its map, and the rigid limit."""
+"""Results of `tune` set by hand as far as figures need them: walks, map of starts, and rigid limit."""
 
 import numpy as np
 from synthetic_walks import motion, stored

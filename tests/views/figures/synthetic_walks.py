@@ -1,4 +1,4 @@
-"""Walks made by hand in the layout that the stages store: legs that swing like pendulums, feet on the slope."""
+"""Walks set by hand, in the layout of the stages: legs that swing like pendulums, with feet on the slope."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What leaves a run for use elsewhere: figures, tables, trajectories, films."""
+"""Tests of exported figures, tables, trajectories and films."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""What the figures show, and when they are drawn."""
+"""Tests of what the figures show, and when they are drawn."""
 
 import functools
 import hashlib

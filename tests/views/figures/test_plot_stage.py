@@ -1,4 +1,4 @@
-"""The stage that draws: files, index, and what is left out."""
+"""Tests of the stage `plot`: its files, its index, and the figures that it leaves out."""
 
 from pathlib import Path
 

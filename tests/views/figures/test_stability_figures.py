@@ -1,4 +1,4 @@
-"""The maps of stability: every cell in its place and colour, and what has no error is not drawn as if it had one."""
+"""Tests of the stability maps: every cell has its place and colour, and a missing error is not drawn as one."""
 
 import numpy as np
 from matplotlib.colors import to_hex

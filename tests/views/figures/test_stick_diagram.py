@@ -1,4 +1,4 @@
-"""The geometry of the stick diagrams: legs keep their length, feet stand where they stand."""
+"""Check the geometry of stick diagrams: legs keep their length, and stance feet their place."""
 
 from dataclasses import replace
 

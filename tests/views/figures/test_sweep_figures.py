@@ -1,4 +1,4 @@
-"""Figures of sweeps over two parameters: lines where one has few values, a map where both have many."""
+"""Tests of figures of sweeps over two parameters: lines if one has few values, a map if both have many."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The pictures of walkers' measures: they name what a config names, lie where it says, and are those of the docs."""
+"""Tests of the drawings of walkers: keys, places of the dimensions, and agreement with the docs."""
 
 import itertools
 import re

@@ -1,4 +1,4 @@
-"""A page as a reader's program sees it."""
+"""Parse a page as a reader's program does."""
 
 from html.parser import HTMLParser
 

@@ -1,4 +1,4 @@
-"""A small run as the report gets it: a real walk, with summaries of round values, in the layout that stages store."""
+"""A small run for the report: a real walk, with summaries of round values, in the layout of the stages."""
 
 import sys
 from dataclasses import replace

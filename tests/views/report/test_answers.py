@@ -1,4 +1,4 @@
-"""What people read on stdout: a headline in words, symbols and units, digits that count, long rows cut short."""
+"""Tests of answers on stdout: a headline in words, symbols and units, digits that count, and shortened rows."""
 
 import csv
 

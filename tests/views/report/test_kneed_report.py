@@ -1,4 +1,4 @@
-"""A kneed walker through the stages: gait, both models on plain ground, their comparison, and what the page says."""
+"""Run a kneed walker through the stages: gait, both models, their comparison, and the page."""
 
 import dataclasses
 from pathlib import Path

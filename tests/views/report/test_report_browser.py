@@ -1,4 +1,4 @@
-"""The report in a real browser: it asks for nothing, its player plays, every view follows, and no table overflows."""
+"""Use the report in a real browser: it loads nothing, its player plays, all views follow, and no table overflows."""
 
 import html
 import itertools

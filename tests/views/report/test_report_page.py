@@ -1,4 +1,4 @@
-"""The page as HTML: whole in itself, well-formed, accessible, and made of text that never becomes markup."""
+"""Tests of the page as HTML: self-contained, well-formed, accessible, and safe from markup in texts."""
 
 import base64
 import hashlib

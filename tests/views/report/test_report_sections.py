@@ -1,4 +1,4 @@
-"""What the report says: the verdict first, and of everything else what there are results of."""
+"""Tests of the report's sections: the verdict first, and a section for each result there is."""
 
 import base64
 import subprocess

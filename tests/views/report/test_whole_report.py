@@ -1,4 +1,4 @@
-"""A whole report of real results, kept short: sections and the results made by hand know the keys that stages store."""
+"""Tests of a whole, short report of real results: sections and synthetic results know the keys that stages store."""
 
 import functools
 
