@@ -31,14 +31,13 @@ from walkerlab.config.analyses import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.evidence.benchmarks.accuracy import START_RATE_FACTOR
+from walkerlab.evidence.benchmarks.references import Reference, reference_for
 from walkerlab.evidence.benchmarks.trials import (
     USER_SCRIPT,
     ContactTrial,
-    Reference,
     RigidTrial,
     Trial,
     contact_trial,
-    reference_for,
     walk_as_a_script,
 )
 from walkerlab.evidence.paper.walker import compass, compass_or_none

@@ -1,4 +1,4 @@
-"""Random walks on compliant ground against a plain integration written for the tests: nothing differs but by errors.
+"""Compare random walks on compliant ground with a plain integration, written for the tests, up to numerical errors.
 
     python scripts/contact_campaign.py                 # 200 walks, seeds 0 to 199
     python scripts/contact_campaign.py --walks 6 --seed 3
@@ -317,7 +317,7 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
         *legs, walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
         si.exponent, si.damping, si.full_damping_penetration, 0.0 if smooth else si.static_friction,
         0.0 if smooth else si.dynamic_friction, si.stiction_velocity, si.friction_velocity,
-        TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
+        TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(walker.hip.parameters),
         np.array(push_offs(config.push_off)), config.push_off.duration_s, np.array(heights_m),
     )  # fmt: skip
 

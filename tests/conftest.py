@@ -29,7 +29,7 @@ LONGEST_FIRST = (  # one of the first three compiles the package's kernels, one 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_xdist_auto_num_workers():
-    """How many workers there are, but for `--maxprocesses`."""
+    """Return the number of workers, which `--maxprocesses` may reduce."""
     return (yield) + 1
 
 

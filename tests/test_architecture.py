@@ -105,7 +105,7 @@ def test_docs_list_the_same_layers():
 
 
 def exceptions(found, paths=IN_LAYERS):
-    """What `found` finds in each file, without files in which it finds nothing."""
+    """Return what `found` finds in each file, without files in which it finds nothing."""
     return {named(path): names for path in paths if (names := found(path))}
 
 

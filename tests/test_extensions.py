@@ -82,7 +82,7 @@ WALK = (
 
 @pytest.fixture(scope="module")
 def walked(example):
-    """The example with a walk on its friction."""
+    """Return a walk of the example on its friction law."""
     done = example("contact-sim", *WALK, "--jobs", "1", "--json")
     assert done.returncode == 0, done.stderr
     return example, json.loads(done.stdout)
@@ -254,7 +254,7 @@ def hinges(tmp_path_factory):
 def sprung_walk(site, command, law):
     parameters = "spring_N_m_per_rad: 30, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.5"
     methods = [f"solver.{model}.method=scipy-lsoda" for model in ("rigid", "contact")]
-    settings = [f"walker.hip={{{parameters}, law: {law}}}", *methods]
+    settings = [f"walker.hip={{{parameters}, hinge_law: {law}}}", *methods]
     words = [word for setting in settings for word in ("--set", setting)]
     done = site(command, "-c", "slope-3deg", "--strides", "1", *words, "--jobs", "1", "--json", "--name", law)
     assert done.returncode == 0, done.stderr
@@ -276,13 +276,13 @@ def test_energy_balances_with_the_cubic_hip_spring_of_an_extension(hinges):
 
 
 def test_incomplete_hinge_law_is_refused_before_the_walk(hinges):
-    done = hinges("simulate", "--set", "walker.hip.law=halfway", "--name", "halfway")
+    done = hinges("simulate", "--set", "walker.hip.hinge_law=halfway", "--name", "halfway")
     assert done.returncode == 3
     assert "the hinge law Halfway ('halfway') is incomplete: it lacks a case @hinge_energy.case(Halfway)" in done.stderr
 
 
 def test_other_programs_refuse_the_hinge_law_of_an_extension(hinges):
-    done = hinges("export", "paper", "model", "--to", "mjcf", "--set", "walker.hip.law=cubic")
+    done = hinges("export", "paper", "model", "--to", "mjcf", "--set", "walker.hip.hinge_law=cubic")
     assert done.returncode == 3
     assert "The hinge law cubic cannot be exported." in done.stderr
 

@@ -203,7 +203,7 @@ DIGEST = "from walkerlab.physics.kernel_cache import sources_digest; print(sourc
 
 @pytest.fixture(scope="module")
 def digest_after_an_edit(unchanged, tmp_path_factory):
-    """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
+    """Return the digest of the kernels' sources before and after a comment is added to a file of a copy."""
     folder = tmp_path_factory.mktemp("edited")
     shutil.copytree(unchanged, folder / "walkerlab")
     command = [sys.executable, "-B", "-c", DIGEST]

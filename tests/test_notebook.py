@@ -11,7 +11,7 @@ NOTEBOOK = Path(__file__).parent.parent / "docs" / "notebook.ipynb"
 
 @pytest.fixture(scope="module")
 def names():
-    """What its cells leave behind."""
+    """Run the notebook and return the names that its cells define."""
     matplotlib.use("Agg")
     names = {}
     for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]:

@@ -19,7 +19,7 @@ DEADLINE_S = 60.0
 
 
 def until(condition):
-    """Wait for something that is bound to come."""
+    """Wait for something that will happen."""
     deadline = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < deadline

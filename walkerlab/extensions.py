@@ -35,7 +35,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "hinge_law": ("linear",),
 }
 """Built-in values of the config keys to which extensions can add values, by the last part of the key. Values of
-`walkers` are those of `walker.type`, and values of `hinge_law` those of `walker.hip.law`.
+`walkers` are those of `walker.type`.
 """
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
 """Positions in the page where extensions add sections: after the task, the walks, the models, and the accuracy."""

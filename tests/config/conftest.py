@@ -32,7 +32,7 @@ def loaded(write: Write) -> Callable[..., LoadedConfig]:
 
 @pytest.fixture
 def refused(write: Write) -> Refused:
-    """Load a text and give the message it is refused with, the file's path shortened to its name."""
+    """Load a text and return the message with which it is rejected. The path of the file is shortened to its name."""
 
     def refuse(text: str = "name: mine\n", sets: Sequence[str] = ()) -> str:
         path = write(text)

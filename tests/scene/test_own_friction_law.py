@@ -56,7 +56,7 @@ class Regularised(NamedTuple):
 
 @pytest.fixture
 def own(monkeypatch):
-    """The paper's walker on ground with that law."""
+    """Return the paper's walker on ground with that law."""
     monkeypatch.setitem(
         friction.friction_coefficient._bodies,
         Regularised,
@@ -67,7 +67,7 @@ def own(monkeypatch):
 
 
 class Wordless(NamedTuple):
-    """A law of which half is left out."""
+    """A law with half of its parts missing."""
 
     mu: float
 
@@ -132,7 +132,7 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
-def test_steepest_change_bounds_a_fall_that_is_steeper_than_the_rise():
+def test_slope_bound_covers_a_friction_law_that_drops_faster_than_it_rises():
     law = Coulomb(static=0.9, dynamic=0.7, stiction_velocity=0.1, friction_velocity=0.11)
     span = 1e-4
     changes = [

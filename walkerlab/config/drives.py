@@ -28,7 +28,7 @@ class Hip(Block):
         le=STRONGEST,
     )
 
-    law: Literal[words("hinge_law")] = key(  # type: ignore[valid-type]
+    hinge_law: Literal[words("hinge_law")] = key(  # type: ignore[valid-type]
         LINEAR,
         "",
         "law of the torques at the hinges, hip and knees, that the parameters belong to; extensions add others",
@@ -75,8 +75,8 @@ def drives_of(config: Any) -> tuple[str, ...]:
 def springs_of(config: Any) -> tuple[str, ...]:
     """Describe the spring and damper between a walker's legs, which supply no energy."""
     stiffness, damping, _ = config.walker.hip.parameters
-    if config.walker.hip.law != LINEAR:
-        return describe_nonzero({f"hinge torques of the law {config.walker.hip.law}": stiffness or damping})
+    if config.walker.hip.hinge_law != LINEAR:
+        return describe_nonzero({f"hinge torques of the law {config.walker.hip.hinge_law}": stiffness or damping})
     return describe_nonzero({
         f"a hip spring of {short_number(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short_number(damping)} N m s/rad": damping,

@@ -137,7 +137,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
 
 
 def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
-    """Return the values of a start that follow from others, by their place.
+    """Return the values of a start that follow from others, by index.
 
     Just after a heel strike both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
     for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of

@@ -624,8 +624,9 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
 
 
 def load_walkers() -> dict[str, type[Block]]:
-    """Import the types of walkers that extensions add, by word. Those that cannot be imported are left out, with a
-    warning.
+    """Import the walker types that extensions add, by the word that names each in a config.
+
+    Types that cannot be imported are left out, with a warning.
     """
     types = {}
     for word, code in declared("walkers").items():

@@ -13,7 +13,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.reads import ContactConfig, GroundConfig
 from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import NoAnswer
-from walkerlab.physics.ground.compliant import KneeRules, contact_walker
+from walkerlab.physics.ground.compliant import ContactDrives, KneeRules, contact_walker
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.resting import RestingFoot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
@@ -79,9 +79,8 @@ def contact_scene(
     rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
-    hinge_law = law_class("hinge_law", config.walker.hip.law)
     drives = contact_drives(config)
-    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, hinge_law=hinge_law, drives=drives)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
     leg = config.walker.leg_length_m
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -119,12 +118,12 @@ def scene_on_pads(
     return contact_scene(config, rigid_step, pitch, asymmetry)
 
 
-def contact_drives(config: ContactConfig) -> dict[str, Any]:
-    """Return the fields of the contact model that hold the torques at hinges and the push-offs of a config."""
+def contact_drives(config: ContactConfig) -> ContactDrives:
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
-    return drives.shared | (pulse if any(drives.push_offs) else {}) | knees
+    fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
+    return ContactDrives(law_class("hinge_law", config.walker.hip.hinge_law), fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:

@@ -23,7 +23,7 @@ from walkerlab.physics.mechanics.hinges import HINGE_LAWS, SpringDamper, hinge_e
 
 
 class LawKind(NamedTuple):
-    """Laws between which a config key chooses."""
+    """Force laws that a config key can select."""
 
     laws: dict[str, Any]  # built-in classes by word
     protocol: type

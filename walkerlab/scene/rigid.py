@@ -102,7 +102,7 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
     Raises ConfigError if the parts are not a valid walker.
     """
-    law = law_class("hinge_law", walker.hip.law)
+    law = law_class("hinge_law", walker.hip.hinge_law)
     assembly = parts.assembly_of(walker, rigid=True)
     try:
         return rigid_on_level_ground(assembly, gravity, parts.knee_locked_at_strike(walker), law)

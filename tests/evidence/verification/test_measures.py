@@ -85,7 +85,7 @@ def test_measure_that_is_nan_or_infinite_fails():
     assert Measure("x", 0.0, 0.0).ok
 
 
-def test_scaling_to_the_twin_and_back_restores_the_walker():
+def test_scaling_a_walker_to_another_size_and_back_restores_it():
     by = to_twin(PAPER)
     back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
     again = scaled(scaled(PAPER, by), back)
@@ -96,8 +96,8 @@ def test_scaling_to_the_twin_and_back_restores_the_walker():
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
-def test_driven_walker_and_its_twin_are_equal_after_scaling_to_unit_size(name):
-    hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "law")
+def test_driven_walkers_of_two_sizes_are_equal_at_unit_size(name):
+    hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "hinge_law")
     sets = (*hip, "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config
     own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))

@@ -185,7 +185,7 @@ def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity
 
 
 def creep_velocity(slope, friction):
-    """The velocity to which a loaded block settles on a slope."""
+    """Return the velocity at which a loaded block creeps steadily down a slope."""
     block = ground.sledge(friction=friction, slope=slope)
     system = place_on_ground(block, BOTH)
     start = ground.placed(block, 0, 3e-5, (-slope,), (0.0,), 0.0, 0.0)

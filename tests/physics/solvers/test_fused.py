@@ -18,7 +18,7 @@ def compiled(a, b, c):
 
 
 @given(numbers, numbers, numbers)
-def test_compiled_fma_rounds_once(a, b, c):
+def test_compiled_fused_multiply_add_rounds_once(a, b, c):
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     assert compiled(a, b, c) == float(exact)
 

@@ -20,7 +20,7 @@ def config(toy, path, gravity, name="stone"):
 
 
 def gravity_of(toy, artifact):
-    """The gravity that a stored fall of one metre tells: t^2 = 2 / g."""
+    """Return the gravity that a stored fall of one metre implies: t^2 = 2 / g."""
     stored = json.loads(toy("show", "drop", "-c", artifact.parent, "--json").stdout)
     return 2.0 / stored["summary"]["period_s"] ** 2
 

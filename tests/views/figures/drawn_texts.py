@@ -5,7 +5,7 @@ from matplotlib.text import Text
 
 
 def texts_drawn(figure):
-    """Every text that the renderer is given, with its box."""
+    """Return every text that the renderer receives, with its box."""
     seen, draw = [], Text.draw
 
     def noted(text, renderer):

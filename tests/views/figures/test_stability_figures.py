@@ -18,7 +18,7 @@ def meshes(figure):
 
 
 def colours(mesh):
-    """The colour of each cell; None where nothing is drawn."""
+    """Return the colour of each cell, or None where nothing is drawn."""
     values = mesh.get_array()
     shown = [to_hex(colour) for colour in mesh.to_rgba(values).reshape(-1, 4)]
     hidden = np.ma.getmaskarray(values).ravel()

@@ -38,7 +38,7 @@ def pictures():
 
 
 def test_pictures_in_the_docs_are_current(pictures):
-    """Their words, that is: the shapes of letters and lines depend on the version of matplotlib."""
+    """Compare their words only: shapes of letters and lines depend on the version of matplotlib."""
     assert {name: words((SCRIPT["IMAGES"] / name).read_bytes()) for name in pictures} == {
         name: words(picture) for name, picture in pictures.items()
     }

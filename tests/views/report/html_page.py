@@ -6,7 +6,7 @@ VOID = {"meta", "img", "input", "line", "polyline"}
 
 
 class Page(HTMLParser):
-    """What a reader's program sees of the page: elements, ids, texts by element."""
+    """A page as a screen reader sees it: elements, ids, texts by element."""
 
     def __init__(self, html):
         super().__init__()

@@ -46,18 +46,18 @@ WALK = {
 
 
 def row(lines, head):
-    """What stands in the row of a table, without its head."""
+    """Return the cells of a table's row, without its head."""
     (found,) = (line for line in lines if line.startswith(f"{head}  "))
     return found.removeprefix(head).split()
 
 
 def said(lines):
-    """The lines as one, with ordinary spaces."""
+    """Join the lines, with ordinary spaces."""
     return " ".join(" ".join(lines).split())
 
 
 def cells(lines):
-    """The words of each line."""
+    """Return the words of each line."""
     return [line.split() for line in lines]
 
 

@@ -53,7 +53,7 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def results(run):
-    """What the report was made of."""
+    """Return the results from which the report was made."""
     config, folder, _ = run
     return Results(config, {name: artifact.read(folder.artifact(name)) for name in STAGES})
 

@@ -131,7 +131,7 @@ class Judge:
         return self.row(entry, radii, None, verdict, "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> Judged:
-        """Judge the loss of balance from MATLAB's initial conditions."""
+        """Judge the paper's claim that the walker loses its balance from MATLAB's initial conditions."""
         steps, outcome = self.measured.contact.from_x_p
         right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
@@ -288,7 +288,7 @@ def table_3(measured: Measured) -> Table:
 
 
 def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
-    """Return the columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
+    """Return the columns: both printed numbers, the rigid model's for each set of equations, the contact model's."""
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import ContactConfig, TuneConfig
+from walkerlab.config.reads import TuneConfig
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import AdamsWalk, adams_walk
@@ -20,7 +20,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.comparison import Motion, add_strike_samples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_feet
-from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, as_state, scale_rates, take_walk
+from walkerlab.physics.hybrid.recorded_walk import as_state, scale_rates, take_walk
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer
@@ -67,7 +67,7 @@ from walkerlab.pipeline.store.content import (
     values_by_column,
 )
 from walkerlab.scene import contact
-from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, contact_drives, knee_rules, start_state
+from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, contact_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
@@ -118,20 +118,17 @@ class LimitFindings:
     without_creep: Extrapolation | None
 
 
-def limit_findings(
-    config: ContactConfig,
-    scene: ContactScene,
-    gait: Cycle,
-    rigid_gait: Mapping[str, Any],
-    walk: RigidWalkResult,
-    progress: Progress,
-) -> LimitFindings | None:
-    """Take the contact to the rigid limit, or return None if the rigid walk has no samples or no step.
+def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Progress) -> LimitFindings | None:
+    """Take the contact to the rigid limit, or return None if there is no contact gait, or if the rigid walk has no
+    samples or no step.
 
     rigid_gait  summary of `fixedpoint`
-    walk        walk of the rigid model from the start
     """
-    if walk.samples is None or walk.steps == 0:
+    config = tune.config
+    scene = tune.scene
+    gait = tune.gait.gait
+    walk = tune.rigid_walk
+    if gait is None or walk.samples is None or walk.steps == 0:
         return None
     compass = isinstance(config.walker, CompassWalker) and config.walker.torso is None
     legs = leg_variables(walk.samples)
@@ -139,15 +136,10 @@ def limit_findings(
     velocity = legs["velocity"].values
     recorded = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
     motion = add_strike_samples(recorded)
-    limit = Limit(
-        scene.ground,
-        float(rigid_gait["period_s"]),
-        float(rigid_gait["step_length_m"]),
-        motion,
-        walk.steps,
-        scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME),
-        1 if compass else COARSE_STRIDE,
-    )
+    period, length = (float(rigid_gait[key]) for key in ("period_s", "step_length_m"))
+    interval = scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME)
+    stride = 1 if compass else COARSE_STRIDE
+    limit = Limit(scene.ground, period, length, motion, walk.steps, interval, stride)
     # Only the compass has point feet in one model and round feet in the other.
     compared = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_SERIES if compass else GAIT_SERIES
@@ -259,11 +251,10 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     tune.find(progress, jobs)
     stored = groups(tune)
     report = summary(tune) | {"left_out": list(adjustment_omissions(config))}
-    if gait.gait is not None and config.tune.rigid_limit:
-        limit = limit_findings(config, scene, gait.gait, rigid_gait, tune.rigid_walk, progress)
-        if limit is not None:
-            stored |= limit_groups(limit)
-            report |= limit_summary(limit)
+    limit = limit_findings(tune, rigid_gait, progress) if config.tune.rigid_limit else None
+    if limit is not None:
+        stored |= limit_groups(limit)
+        report |= limit_summary(limit)
     return Content(stored, report)
 
 

@@ -29,9 +29,10 @@ ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which 
 PER_STICTION: Final = 10.0  # friction velocity / stiction velocity, as in the paper
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-CELL_BUDGET = 600_000  # right-hand sides
+# right-hand sides per cell: for the walk, for its second walk at tighter tolerances, and for the reference, which
+# mostly needs about 7e6
+CELL_BUDGET = 600_000
 TIGHTER_CELL_BUDGET = 1_200_000
-# Most references need about 7e6.
 REFERENCE_CELL_BUDGET = 20_000_000
 MAX_FIXED_STEPS: Final = 5_000_000  # steps of semi-implicit Euler, more than any cell needs
 VERDICT_NAMES: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")

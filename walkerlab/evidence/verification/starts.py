@@ -284,15 +284,16 @@ def add_midpoints(grid: Floats) -> Floats:
     return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
 
 
-def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
-    """Return the ends of intervals after splitting those marked in `wanting` into four. `times` holds ends and
-    midpoints.
+def split(times: Floats, coarse: NDArray[np.bool_]) -> Floats:
+    """Return the ends of intervals after splitting those marked in `coarse` into four.
+
+    `times` holds ends and midpoints.
     """
     first = times[:-1:2]
     middle = times[1::2]
     last = times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
-    return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
+    return np.sort(np.concatenate([times[::2], halves[np.tile(coarse, 3)]]))
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:

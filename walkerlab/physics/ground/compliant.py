@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,6 @@ from walkerlab.physics.mechanics import parts, tree
 from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper
 from walkerlab.physics.solvers.system import Floats
 
-NO_DRIVES: Mapping[str, Any] = MappingProxyType({})
-
 
 @dataclass(frozen=True)
 class KneeRules:
@@ -29,6 +26,14 @@ class KneeRules:
 
     stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
     release_at_touch: bool = False  # release the trailing knee at the touch, not when the leading foot stops sinking in
+
+
+@dataclass(frozen=True)
+class ContactDrives:
+    """Torques at the hinges, and push-offs. By default there are none."""
+
+    law: type[SpringDamper] = SpringDamper
+    fields: Mapping[str, Any] = field(default_factory=dict)  # of every form, as in `tree.write_fields`
 
 
 @dataclass(frozen=True)
@@ -46,20 +51,18 @@ def contact_walker(
     slope: float,
     knee_rules: KneeRules | None = None,
     pinned_foot: int = STANCE_FOOT,
-    hinge_law: type[SpringDamper] = SpringDamper,
-    drives: Mapping[str, Any] = NO_DRIVES,
+    drives: ContactDrives | None = None,
 ) -> ContactWalker:
     """Assemble a walker on compliant ground (gravity in m/s^2, slope in rad). Foot k and knee k belong to leg k.
-
-    drives  fields of all forms for torques at hinges and push-offs, as in `tree.write_fields`
 
     In the pinned forms, the hinge is the centre of the ball of `pinned_foot`, at position 0 along the slope. Raises
     ValueError, with a message for the user, if the parts cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
+    drives = drives or ContactDrives()
     check_walkable(assembly)
     # All forms are assembled beforehand: a walk only picks another record when a knee locks or a foot is released.
-    forms = np.zeros((2, 4), tree.record_type(GroundModel, FORM_SHAPES, hinge_law))
+    forms = np.zeros((2, 4), tree.record_type(GroundModel, FORM_SHAPES, drives.law))
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
     forms["has_knee"] = [k < len(assembly.knees) for k in range(2)]
@@ -71,7 +74,7 @@ def contact_walker(
     legs = parts.leg_bodies(assembly)
     # Merging bodies renumbers them, so the hip's two bodies are looked up in each form.
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
-    tree.write_fields(forms, drives)
+    tree.write_fields(forms, drives.fields)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 

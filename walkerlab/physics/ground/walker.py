@@ -29,10 +29,7 @@ STATE_VECTOR = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
 FIRST_KNEE = HIP_ROW + 1  # row of the first knee in `hinges` and `laws`
 # states of a knee
-RELEASED = 0
-BENT = 1
-STOPPING = 2
-LOCKED = 3
+RELEASED, BENT, STOPPING, LOCKED = range(4)
 
 
 @tree.fast_fields

@@ -77,7 +77,7 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
 
 
 HINGE_LAWS: dict[str, type[SpringDamper]] = {"linear": SpringDamper}
-"""Hinge laws by their names in `walker.hip.law` of a config."""
+"""Hinge laws by their names in `walker.hip.hinge_law` of a config."""
 LAW_NUMBERS = len(SpringDamper._fields)
 DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))
 HIP_ROW = 0  # row of the hinge between the legs

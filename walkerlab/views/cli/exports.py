@@ -344,7 +344,7 @@ MAX_GIF_RATE = 50
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return `model` or, if None, contact-sim (simulate if only that has run).
+    """Return `model`. If it is None, choose contact-sim, or simulate if only that has run.
 
     Raises ConfigError if `model` does not walk.
     """
