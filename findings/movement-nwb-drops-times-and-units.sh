@@ -15,7 +15,11 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 python3 -m venv venv
-venv/bin/pip install -q --disable-pip-version-check movement==0.15.0 ndx-pose==0.4.0 pynwb==4.2.0
+# Both packages bring editors and video codecs that reading of NWB does not need.
+venv/bin/pip install -q --disable-pip-version-check --no-deps movement==0.15.0 sleap-io==0.9.5
+venv/bin/pip install -q --disable-pip-version-check ndx-pose==0.4.0 pynwb==4.2.0 xarray==2026.9.0 pandas==3.1.1 scipy==1.17.1 \
+    numpy==2.4.6 loguru==0.7.3 attrs==26.1.0 PyYAML==6.0.4 tqdm==4.70.1 imageio==2.38.1 imageio-ffmpeg==0.8.1 \
+    lazy_loader==0.6 simplejson==4.3.0
 cat > poses.py <<'EOF'
 import datetime
 from importlib.metadata import version
