@@ -25,7 +25,6 @@ from numba.core.types.npytypes import Record
 from numba.np import linalg
 
 from walkerlab.code_digest import PACKAGE, Sources, digest_of
-from walkerlab.extensions import load
 from walkerlab.physics.kernel_cache import cache_folder, files_of, lock_of, watchers, write_file
 
 CHECKSUM_BYTES = 32  # of SHA-256, before a kernel's stored code
@@ -151,7 +150,9 @@ def strip_bitcode(path: Path) -> bytes:
 def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
     """Yield the classes that fields of a record type name as "module/class"."""
     # NumPy's records cannot be read by others if a field's name has a colon.
-    yield from (load(name.replace("/", ":")) for name in fields if "/" in name)
+    for module, slash, name in (field.partition("/") for field in fields):
+        if slash:
+            yield getattr(importlib.import_module(module), name)
 
 
 def classes_in(kind: Any) -> Iterator[type]:

@@ -15,6 +15,7 @@ from numba.np.arrayobj import make_array, populate_array
 
 from walkerlab.physics.compiler import FLAGS, Kernel, bodies
 from walkerlab.physics.compiler import PART_FLAGS as PART_FLAGS
+from walkerlab.physics.compiler import classes_named_by as classes_named_by
 
 # inlined, because passing lanes through memory costs as much as the arithmetic on them
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
@@ -130,6 +131,7 @@ def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
 class LawKind(NamedTuple):
     """Force laws that a config key can select."""
 
+    key: str  # last part of the key
     laws: dict[str, Any]  # built-in classes by word
     protocol: type
     required: tuple[ByType, ...]  # functions of which each law needs a case

@@ -16,7 +16,8 @@ from walkerlab.config.reads import ContactConfig, GroundConfig
 from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.ground.compliant import ContactDrives, KneeRules, contact_walker
-from walkerlab.physics.ground.normal_force import Impact
+from walkerlab.physics.ground.friction import FRICTION_LAWS
+from walkerlab.physics.ground.normal_force import NORMAL_LAWS, Impact
 from walkerlab.physics.ground.resting import RestingFoot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.physics.ground.walker import floating_state
@@ -32,7 +33,7 @@ from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between
 from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.laws import ground_law, law_class
+from walkerlab.scene.laws import ground_law, hinge_law_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
 from walkerlab.scene.rigid import have_different_legs
 
@@ -125,7 +126,7 @@ def scene_on_pads(
 
 
 def contact_drives(config: ContactConfig) -> ContactDrives:
-    law = law_class("hinge_law", config.walker.hip.hinge_law)
+    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
@@ -199,7 +200,7 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
     Raises ConfigError if a law that an extension added is incomplete.
     """
     si = contact.to_si()
-    return ground_law("normal_force", si), ground_law("friction", si)
+    return ground_law(NORMAL_LAWS, si), ground_law(FRICTION_LAWS, si)
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:

@@ -1,41 +1,41 @@
 """Laws that a config names: those of the ground and of the hinges, built-in ones and those of extensions."""
 
-from typing import Any, Final
+from typing import Any
 
 from walkerlab.config.contact import Contact
 from walkerlab.errors import ConfigError
 from walkerlab.extensions import declared, load
-from walkerlab.physics.ground.friction import FRICTION_LAWS
-from walkerlab.physics.ground.normal_force import NORMAL_LAWS
 from walkerlab.physics.kernels import LawKind
 from walkerlab.physics.mechanics.hinges import HINGE_LAWS
+from walkerlab.scene.parts import AnyWalker
 
-LAW_KINDS: Final = {"normal_force": NORMAL_LAWS, "friction": FRICTION_LAWS, "hinge_law": HINGE_LAWS}
+
+def hinge_law_of(walker: AnyWalker) -> Any:
+    return law_class(HINGE_LAWS, walker.hip.hinge_law)
 
 
-def law_class(key: str, word: str) -> Any:
-    """Return the class of the law that a config names under a key of `LAW_KINDS`.
+def law_class(kind: LawKind, word: str) -> Any:
+    """Return the class of the law that a config names.
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
-    kind = LAW_KINDS[key]
     try:
-        law = kind.laws.get(word) or load(declared(key)[word])
+        law = kind.laws.get(word) or load(declared(kind.key)[word])
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"{error}.", where_to_look(kind)) from error
     if missing := missing_members(law, kind):
-        named = f"the {key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
+        named = f"the {kind.key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
         raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(kind))
     return law
 
 
-def ground_law(key: str, contact: Contact) -> Any:
+def ground_law(kind: LawKind, contact: Contact) -> Any:
     """Create the law that a contact block in SI names. Raises ConfigError as `law_class` does."""
-    law = law_class(key, getattr(contact, key))
+    law = law_class(kind, getattr(contact, kind.key))
     try:
         return law.from_contact(contact)
     except (TypeError, AttributeError) as error:
-        raise ConfigError(f"{error}.", where_to_look(LAW_KINDS[key])) from error
+        raise ConfigError(f"{error}.", where_to_look(kind)) from error
 
 
 def where_to_look(kind: LawKind) -> str:

@@ -44,7 +44,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.simulate import leg_variables
+from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
     TIME,

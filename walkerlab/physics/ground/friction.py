@@ -164,6 +164,7 @@ def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
 
 
 FRICTION_LAWS: Final = LawKind(
+    "friction",
     {"coulomb": Coulomb, "none": Frictionless},
     FrictionLaw,
     (friction_coefficient,),

@@ -144,5 +144,7 @@ def impact_switching_penetration(law: Impact) -> float:
     return law.full_damping_penetration
 
 
-NORMAL_LAWS: Final = LawKind({"impact": Impact}, NormalLaw, (normal_force, release_function, elastic_energy))
+NORMAL_LAWS: Final = LawKind(
+    "normal_force", {"impact": Impact}, NormalLaw, (normal_force, release_function, elastic_energy)
+)
 """Laws of the normal force by their names in `contact.normal_force` of a config."""

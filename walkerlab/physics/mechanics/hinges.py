@@ -13,10 +13,10 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Final, NamedTuple
 
-from walkerlab.physics.compiler import classes_named_by
 from walkerlab.physics.kernels import (
     ALWAYS_INLINE_FLAGS,
     LawKind,
+    classes_named_by,
     compile_as,
     dispatch_by_type_or_default,
     forced_inline,
@@ -77,7 +77,7 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-HINGE_LAWS: Final = LawKind({"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy))
+HINGE_LAWS: Final = LawKind("hinge_law", {"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy))
 """Hinge laws by their names in `walker.hip.hinge_law` of a config."""
 LAW_NUMBERS = len(SpringDamper._fields)
 DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))

@@ -19,7 +19,7 @@ from walkerlab.physics.orbits.step_map import Cycle, Monitor
 from walkerlab.physics.orbits.two_parameters import BifurcationCurve, Regions
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.pipeline.stages.simulate import trajectory_group
+from walkerlab.pipeline.stages.rigid_groups import trajectory_group
 from walkerlab.pipeline.stages.walk import evenly_spread, select_samples
 from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
 from walkerlab.scene.parameter import Parameter

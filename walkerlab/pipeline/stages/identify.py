@@ -22,7 +22,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, MeasuredFile
-from walkerlab.pipeline.stages.simulate import place_variables, reorder_by_leg
+from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import leg_labels, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
 from walkerlab.scene.identification import LEGS, identify_walk

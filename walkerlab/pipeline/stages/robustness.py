@@ -32,7 +32,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.simulate import groups as groups_of_walk
+from walkerlab.pipeline.stages.rigid_groups import groups as groups_of_walk
 from walkerlab.pipeline.store.content import Content, Group, Variable, rows_group
 from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.parameter import parameter_keys, parameter_of
