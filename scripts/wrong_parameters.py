@@ -1,16 +1,19 @@
 """Identify walkers whose fixed parameter is wrong, and count how often the answer warns where it must.
 
-Usage: python scripts/wrong_parameters.py [WALKS, 100 by default] [steps | angles]
+Usage: python scripts/wrong_parameters.py [WALKS, 100 by default] [steps | angles] [--first SEED] [--right]
+       [--guess SHARE]
 
 One of hip mass, leg length and slope is held fixed at a value that is off by 2, 5 or 12 %; the other two are fitted.
 The answer must warn where an estimate is off by more than two of its standard errors and freeing the fixed parameter
-raises the log-likelihood by more than 3.
+raises the log-likelihood by more than 3. With `--right`, the fixed parameter is right, and the answer should not warn.
+The fit starts from the right values, or with `--guess` from random ones that are off by up to this share.
 """
 
+import argparse
 import itertools
-import sys
 from pathlib import Path
 
+import numpy as np
 from identification_coverage import Truth
 
 from walkerlab.api.memory import run_in_memory
@@ -25,31 +28,37 @@ WALKERS = ("paper", "slope-3deg")
 OFF, DECISIVE = 2.0, 3.0  # standard errors; gain of the log-likelihood
 
 
-def verdict_of(name, truth, measured, wrong, share):
+def verdict_of(name, truth, measured, wrong, share, guesses=(0.0, 0.0, 0.0)):
     """Return whether the answer must warn, whether it does, and a line about it."""
     values = dict(zip(KEYS, truth.values, strict=True))
-    config = load(Path(name), (f"{wrong}={values[wrong] * (1.0 + share)}",)).config
+    shares = dict(zip(KEYS, guesses, strict=True)) | {wrong: share}
+    config = load(Path(name), tuple(f"{key}={values[key] * (1.0 + shares[key])}" for key in KEYS)).config
     gait = run_in_memory("fixedpoint", config).summary
     kept = [key for key in KEYS if key != wrong]
-    fixed, free = (identify_walk(config, measured, gait, Identify(fit=dict.fromkeys(keys))) for keys in (kept, KEYS))
+    fixed = identify_walk(config, measured, gait, Identify(fit=dict.fromkeys(kept)))
     off = max(abs(each.value - values[each.key]) / (each.standard_error or float("inf")) for each in fixed.estimates)
-    gain = free.verdict.log_likelihood - fixed.verdict.log_likelihood
+    gain = 0.0
+    if share:
+        free = identify_walk(config, measured, gait, Identify(fit=dict.fromkeys(KEYS)))
+        gain = free.verdict.log_likelihood - fixed.verdict.log_likelihood
     warns = fixed.verdict.fit != "fits"
     line = f"off by {off:.1f} standard errors, gain {gain:.1f}, {fixed.verdict.fit}: {'; '.join(fixed.verdict.reasons)}"
     return off > OFF and gain > DECISIVE, warns, line
 
 
-def main(walks, level):
+def main(options):
     counts = {True: [], False: []}
-    truths = {name: Truth(name, KEYS, level) for name in WALKERS}
+    truths = {name: Truth(name, KEYS, options.level) for name in WALKERS}
     cases = itertools.cycle(itertools.product(WALKERS, KEYS, SHARES))
-    for seed, (name, wrong, share) in zip(range(walks), cases, strict=False):
+    for seed, (name, wrong, share) in zip(range(options.first, options.first + options.walks), cases, strict=False):
+        share = 0.0 if options.right else share
         truth = truths[name]
         walk = truth.walk(seed)
         if walk is None:
             continue
+        guesses = options.guess * np.random.default_rng(seed).uniform(-1.0, 1.0, len(KEYS))
         try:
-            must, warns, line = verdict_of(name, truth, walk[0], wrong, share)
+            must, warns, line = verdict_of(name, truth, walk[0], wrong, share, guesses)
         except WalkerlabError as error:
             print(f"{seed} {name} {wrong} {share:+.0%}: refused: {error}", flush=True)
             continue
@@ -60,4 +69,10 @@ def main(walks, level):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100, sys.argv[2] if len(sys.argv) > 2 else "steps")
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("walks", type=int, nargs="?", default=100)
+    parser.add_argument("level", nargs="?", default="steps", choices=("steps", "angles"))
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--right", action="store_true")
+    parser.add_argument("--guess", type=float, default=0.0)
+    main(parser.parse_args())

@@ -14,7 +14,12 @@ from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import MOVE_TOLERANCE
-from walkerlab.physics.estimation.information import robust_covariance
+from walkerlab.physics.estimation.information import (
+    average_covariance,
+    likely_noises,
+    marginalise,
+    robust_covariance,
+)
 from walkerlab.physics.estimation.judgement import implausible_disturbances
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
@@ -277,13 +282,26 @@ def test_wrong_hip_mass_is_named_with_its_likelihood_gain():
     assert abs(values(right)[HIP].value - 10.0) < 3.0 * values(right)[HIP].standard_error
 
 
-def test_wrong_leg_length_is_doubted_in_steps_that_hardly_show_it():
+@cache
+def twenty_steps():
     *_, model, start = walker()
-    measured = MeasuredWalk(*measure_steps(model, start, np.random.default_rng(0), steps=20))
-    wrong, right = (identify(measured, f"{LEG}={leg}", fit={"slope_deg": None, HIP: None}) for leg in (0.88, 1.0))
+    return MeasuredWalk(*measure_steps(model, start, np.random.default_rng(0), steps=20))
+
+
+@pytest.mark.parametrize("leg", [0.88, 0.98, 1.12])
+def test_wrong_leg_length_is_named_with_its_right_value_in_steps_that_hardly_show_it(leg):
+    wrong = identify(twenty_steps(), f"{LEG}={leg}", fit={"slope_deg": None, HIP: None})
     assert wrong.verdict.fit == "fits-but"
-    assert "would raise the log-likelihood" in " ".join(wrong.verdict.reasons)
-    assert right.verdict.fit == "fits"
+    text = " ".join(wrong.verdict.reasons)
+    better, fixed = map(float, re.search(rf"{LEG} of ([\d.]+) \(m\) instead of ([\d.]+)", text).groups())
+    assert "would explain the walk as well, with slope_deg and walker.hip_mass_kg as in the config" in text
+    assert (better, fixed) == (pytest.approx(1.0, abs=2e-3), leg)
+
+
+@pytest.mark.parametrize("guesses", [(), ("slope_deg=3.2", HIP + "=9")])
+def test_wrong_guesses_of_the_estimates_raise_no_doubt(guesses):
+    result = identify(twenty_steps(), *guesses, fit={"slope_deg": None, HIP: None})
+    assert result.verdict.fit == "fits"
 
 
 def test_rate_jumps_at_strikes_are_estimated_with_valid_errors():
@@ -295,6 +313,24 @@ def test_rate_jumps_at_strikes_are_estimated_with_valid_errors():
     assert even.process["kick"] < 0.001
     assert kicked.process["kick"] > 0.003
     assert values(kicked)[HIP].standard_error > 2.5 * values(even)[HIP].standard_error
+
+
+def test_errors_allow_for_every_disturbance_that_may_have_moved_the_walk():
+    result = identify(twenty_steps(), fit={"slope_deg": None, HIP: None})
+    fitted = result.fitted
+    noises = likely_noises(fitted)
+    assert [bool(each) for each in noises.roughness_m] == [False, True, False, True]
+    assert [bool(each) for each in noises.kick] == [False, False, True, True]
+    alone = [average_covariance(fitted, Noise(*(part[[index]] for part in noises)), np.eye(2)) for index in range(4)]
+    likelihoods = evaluate(fitted.rows, noises).restricted
+    weights = np.exp(likelihoods - likelihoods.max())
+    average = np.tensordot(weights / weights.sum(), alone, 1)
+    assert average_covariance(fitted, noises, np.eye(2)) == pytest.approx(average, rel=1e-9)
+    # In no direction are the stated errors smaller than the average or those of the likeliest disturbance.
+    likeliest = np.linalg.inv(marginalise(fitted.evaluation.information, 2))
+    stated = result.information.covariance / np.outer(fitted.forecast.scales, fitted.forecast.scales)
+    for smaller in (average, likeliest):
+        assert np.linalg.eigvals(np.linalg.solve(smaller, stated)).real.min() > 1.0 - 1e-6
 
 
 def test_correlated_angle_noise_shows_in_the_residuals():

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from itertools import compress
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import chdtri, fdtrc
 
 from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
-from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
-from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
+from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit, refit
+from walkerlab.physics.estimation.information import information_on, marginalise, open_combinations, robust_covariance
 from walkerlab.physics.estimation.judgement import alternates, describe_limp, judge, measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
@@ -89,11 +91,14 @@ MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of 
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
-PROMISING_GAIN: Final = 1.4  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
-REFIT_ROUNDS: Final = 3  # rounds of a new fit with a freed parameter; its gain hardly changes after them
+PROMISING_GAIN: Final = 2.0  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
 RARE_GAIN: Final = 0.01  # a gain is surprising if it is more improbable than this under the right model
+REFITS: Final = 3  # refits with a freed parameter, each of which must raise the log-likelihood
+REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
+UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
 """Parameters whose value is beyond doubt."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
@@ -274,8 +279,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     z = gait_start(subject, family, measured.first_leg)
     directions = felt_directions(walks, z, family.start)
     forecast = Forecast(walks, family.admits, family.scales(), z, directions, measured, question.sensors)
-    free = (-math.inf, math.inf)
-    bounds = [question.fit.get(key) or free for key in question.keys]
+    bounds = [question.fit.get(key) or UNBOUNDED for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
     leg_m = subject.config.walker.leg_length_m
     loss = question.loss
@@ -418,7 +422,8 @@ def describe_pull(pull: Pull) -> str:
 def suggest_parameter(
     subject: ModelUnderTest, keys: Sequence[str], others: Sequence[Fixed], fitted: Fitted
 ) -> Iterator[str]:
-    """Yield a fixed parameter or nuisance that would raise the log-likelihood if it were estimated as well.
+    """Yield a fixed parameter or nuisance that would explain the walk better if it were estimated as well, or as well
+    if it alone differed from the config.
 
     A parameter that somebody measured is doubted once it explains the walk better. Any other one, such as gravity or a
     spring that the walker is not said to have, must gain more than chance allows for as many values.
@@ -431,61 +436,105 @@ def suggest_parameter(
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
     order = np.lexsort((-gains, ~measured)).tolist() if others else []
+    alone = max(changes_alone(subject, keys, compress(others, measured), fitted), key=itemgetter(0), default=None)
+    if alone is not None:
+        yield (
+            f"{describe_change(*alone[1:])} would explain the walk as well, with {' and '.join(keys)} as in the "
+            f"config: measure it again, or estimate it as well (--fit {alone[1].name})"
+        )
+        return
     for index in [each for each in order if gains[each] >= PROMISING_GAIN][:MAX_FREED]:
         other = others[index]
-        gain, part, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
-        rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(part, 0.0) / values)) < RARE_GAIN
-        decisive = gain > DECISIVE_GAIN if other.measured else part > DECISIVE_GAIN and rare
-        if decisive and abs(change) > SMALLEST_CHANGE:
-            before = NUISANCES.get(other.name, (other.value, 0.0))[0]
+        gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
+        if gain > DECISIVE_GAIN and (other.measured or rare) and abs(change) > SMALLEST_CHANGE:
             option = "--nuisance" if other.name in NUISANCES else "--fit"
-            after = add_unit(f"{before + change * other.scale:.4g}", other.unit)
             yield (
-                f"{other.name} of {after} instead of {before:.4g} would raise the log-likelihood by about {gain:.3g}: "
+                f"{describe_change(other, change)} would raise the log-likelihood by about {gain:.3g}: "
                 f"estimate it as well ({option} {other.name})"
             )
             return
 
 
+def describe_change(other: Fixed, change: float) -> str:
+    before = NUISANCES.get(other.name, (other.value, 0.0))[0]
+    return f"{other.name} of {add_unit(f'{before + change * other.scale:.4g}', other.unit)} instead of {before:.4g}"
+
+
+def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
+    """Return by how much the log-likelihood would fall, to second order, if all estimates but the one that helps most
+    had the config's values.
+    """
+    count = len(keys)
+    moved = fitted.u[:count] - np.array(fitted.problem.start) / fitted.forecast.scales
+    information = marginalise(fitted.evaluation.information, count)
+    # in turn, the last parameter is free
+    orders = [np.roll(np.arange(count), shift) for shift in range(count)]
+    rests = [(moved[order[:-1]], marginalise(information[np.ix_(order, order)], count - 1)) for order in orders]
+    return min(float(0.5 * moves @ known @ moves) for moves, known in rests)
+
+
+def changes_alone(
+    subject: ModelUnderTest, keys: Sequence[str], others: Iterable[Fixed], fitted: Fitted
+) -> Iterator[tuple[Any, Fixed, float]]:
+    """Yield the log-likelihood, the fixed parameter and its change, in its scale, wherever this change alone explains
+    a walk that contradicts the config, while at least two estimated parameters keep the config's values.
+    """
+    if (
+        len(keys) < 2
+        or subject.model != RIGID
+        or fitted.problem.priors
+        or distance_from_config(keys, fitted) < FAR_FROM_CONFIG
+    ):
+        return
+    # A likelihood-ratio test must not reject the change alone in favour of the estimates, which are more parameters.
+    enough = fitted.evaluation.likelihood - 0.5 * chdtri(len(keys) - 1, REJECTED)
+    for other in others:
+        problem = problem_for(subject, (other.name,), [UNBOUNDED], fitted.problem)
+        refitted = refit(problem, problem.initial_unknowns(), fitted)
+        if refitted and refitted.evaluation.likelihood > enough:
+            yield refitted.evaluation.likelihood, other, float(refitted.u[0]) - other.value / other.scale
+
+
 def gain_of_freeing(
     subject: ModelUnderTest, keys: Sequence[str], other: Fixed, rows: Reduced, fitted: Fitted
-) -> tuple[float, float, float]:
-    """Return how much the log-likelihood rises if one more parameter is estimated, the part of this rise that is due
-    to its own change, and this change.
+) -> tuple[float, float]:
+    """Return how much the log-likelihood rises if one more parameter is estimated, and the change of this parameter, in
+    its scale.
 
-    The change is in the parameter's scale. All are those of a linearised step with new standard deviations or, if the
-    step is long and promising, of a new fit.
+    Both are those of a linearised step with new standard deviations or, if the step is long, of a new fit.
 
     rows  data of the walk, with the derivative for one more parameter
     """
     problem = fitted.problem
     count = len(keys)
     step = evaluate(rows, fitted.noise).move
-    free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
-    gain = float(free.likelihood - fitted.evaluation.likelihood)
     if np.abs([*step[:count], step[-1] if other.value else 0.0]).max() < LINEAR_MOVE:
-        return gain, gain, float(free.move[-1])
-    if gain < PROMISING_GAIN or other.name in NUISANCES or subject.model != RIGID:
-        return 0.0, 0.0, 0.0
+        free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
+        return float(free.likelihood - fitted.evaluation.likelihood), float(free.move[-1])
+    if not other.measured or subject.model != RIGID:
+        return 0.0, 0.0
     start = np.insert(fitted.u, count, other.value / other.scale)
-    refitted = fit(free_parameter(subject, (*keys, other.name), problem), start, rounds=REFIT_ROUNDS)
-    if refitted is None:
-        return 0.0, 0.0, 0.0
-    change = float(refitted.u[count] - start[count])
-    # A new fit may also end in better standard deviations. The parameter itself gains half its squared change, in
-    # standard errors.
-    variance = robust_covariance(refitted, np.eye(refitted.u.size))[count, count]
-    gain = float(refitted.evaluation.likelihood - fitted.evaluation.likelihood)
-    return gain, min(gain, 0.5 * change**2 / float(variance)), change
+    wider = problem_for(subject, (*keys, other.name), [*problem.bounds, UNBOUNDED], problem)
+    like = fitted
+    u = start
+    # The standard deviations may change back and forth between refits, and a gain that does not stay is none.
+    for _ in range(REFITS):
+        refitted = refit(wider, u, like)
+        if refitted is None or refitted.evaluation.likelihood - fitted.evaluation.likelihood <= DECISIVE_GAIN:
+            return 0.0, 0.0
+        like = refitted
+        u = refitted.u
+    return float(like.evaluation.likelihood - fitted.evaluation.likelihood), float(u[count] - start[count])
 
 
-def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:
-    """Return a problem that fits one more parameter, the last of `keys`."""
+def problem_for(
+    subject: ModelUnderTest, keys: Sequence[str], bounds: Sequence[Sequence[float]], problem: FitProblem
+) -> FitProblem:
+    """Return a problem that fits other keys to the same walk."""
     family = ConfigFamily(subject.config, keys)
-    forecast = problem.forecast
-    walks = step_map_of(subject, family, forecast.measured.first_leg)
-    forecast = replace(forecast, walks=walks, admits=family.admits, scales=family.scales())
-    bounds = [*problem.bounds, (-math.inf, math.inf)]
+    walks = step_map_of(subject, family, problem.forecast.measured.first_leg)
+    forecast = replace(problem.forecast, walks=walks, admits=family.admits, scales=family.scales())
     return replace(problem, forecast=forecast, start=family.start, bounds=bounds)
 
 

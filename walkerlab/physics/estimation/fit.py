@@ -206,15 +206,24 @@ def fit(
     return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, end)
 
 
+def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
+    """Fit another problem to the walk of a fit, from a start (unknowns,): the unknowns with the noise of that fit, then
+    the standard deviations. Returns None if a walk ends early.
+    """
+    data = linearise(problem, start, like.disturbances)
+    if data is None:
+        return None
+    u = least_squares_fit(problem, start, start, like.heights_m, data, like.noise)
+    return evaluate_at(u, replace(like, problem=problem))
+
+
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at u (unknowns,), starting from another fit, or return None if a
     walk ends early.
     """
     problem = like.problem
-    even = np.zeros(like.forecast.heights)
-    robust = robust_at(like.rows, like.noise)
-    data = linearise(problem, u, even, robust=robust)
-    predicted = problem.forecast.predict(u, even)
+    data = linearise(problem, u, like.disturbances, robust=robust_at(like.rows, like.noise))
+    predicted = problem.forecast.predict(u, np.zeros(like.forecast.heights))
     if data is None or predicted is None:
         return None
     rows = reduce(data)

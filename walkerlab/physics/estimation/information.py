@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.mixed_model import LOST_INFORMATION, Evaluation, evaluate, noise_at, whitening
+from walkerlab.physics.estimation.mixed_model import (
+    LOST_INFORMATION,
+    Evaluation,
+    Noise,
+    evaluate,
+    noise_at,
+    noise_by_disturbances,
+    whitening,
+)
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
@@ -36,7 +44,11 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     result = replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
     groups = fitted.forecast.half_steps
     if not groups.size:
-        return result
+        # Floor and kicks move the estimates by different amounts, and a short walk hardly tells which of them it was.
+        average = average_covariance(fitted, likely_noises(fitted), basis)
+        root = np.linalg.cholesky(basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T)
+        inverse = np.linalg.inv(root)
+        return replace(result, **in_units(widen(basis.T @ root, inverse @ average @ inverse.T), scales))
     determined = np.eye(fitted.u.size)
     determined[: len(keys), : len(keys)] = basis.T @ basis
     covariance = robust_covariance(fitted, determined)[: len(keys), : len(keys)]
@@ -69,6 +81,11 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
         # as if the fit had not followed the residuals of this group
         score = np.linalg.solve(np.eye(len(meat)) - J[rows].T @ J[rows], J[rows].T @ residuals[rows])
         meat += (1.0 - 1.0 / count) * np.outer(score, score)
+    return widen(root, meat)
+
+
+def widen(root: Floats, meat: Floats) -> Floats:
+    """Return the covariance `root @ meat @ root.T`, or `root @ root.T` in directions in which that is larger."""
     values, vectors = np.linalg.eigh(meat)
     root = root @ (vectors * np.sqrt(np.maximum(values, 1.0)))
     return np.asarray(root @ root.T)
@@ -111,7 +128,6 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
     # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     noise = fitted.noise
-    count = basis.shape[1]
     sources = tuple(np.flatnonzero(noise.process).tolist())
     centre = np.log(np.append(noise.measurement, noise.process[list(sources)]))
 
@@ -121,9 +137,24 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     # The seed is fixed, so that the same walk always gives the same error.
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
     logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
-    drawn = evaluate_at(logs)
+    return average_covariance(fitted, noise_at(logs, sources), basis)
+
+
+def likely_noises(fitted: Fitted) -> Noise:
+    """Return the likeliest noises (sets,) without disturbances, with each alone and with both, stacked."""
+    problem = fitted.problem
+    noises, _ = zip(
+        *noise_by_disturbances(fitted.rows, problem.floors, problem.leg_length_m, fitted.noise), strict=True
+    )
+    return Noise(*map(np.array, zip(*noises, strict=True)))
+
+
+def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:
+    """Average the covariance along directions `basis` (directions, parameters) over noises (n,), by likelihood."""
+    count = basis.shape[1]
+    drawn = evaluate(fitted.rows, noises)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
-    moved = drawn.move[:, :count] @ basis.T
+    moved = (drawn.move - fitted.evaluation.move)[:, :count] @ basis.T
     # Law of total variance: the estimate itself moves with the standard deviations.
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())

@@ -8,7 +8,7 @@ not depend on the number of samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -35,6 +35,8 @@ about one standard error away from zero where noise and floor cannot be separate
 Source: Chung et al., A nondegenerate penalized likelihood estimator for variance parameters in multilevel models,
 Psychometrika 78 (2013).
 """
+NOISE_SEARCH: Final = {"ftol": 1e-7, "gtol": 1e-2}
+"""The search ends when the likelihood changes by less than this (relative), or its slope in the logarithms does."""
 # of all noise levels that are evaluated together, which limits the memory
 MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
@@ -246,8 +248,23 @@ def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Flo
 def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    The search is run without disturbances, with each alone and with both, each time from the likeliest of several
-    starts. Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
+    Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
+    """
+    best = start
+    best_likelihood = -math.inf
+    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start):
+        if likelihood > best_likelihood + MIN_GAINS[bool(noise.kick)]:
+            best = noise
+            best_likelihood = likelihood
+    return best
+
+
+def noise_by_disturbances(
+    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise
+) -> Iterator[tuple[Noise, float]]:
+    """Yield the likeliest noise without disturbances, with each alone and with both, and its restricted likelihood.
+
+    Each search starts from the likeliest of several noises.
     """
     units = np.array((leg_length_m, 1.0))
     widest = np.maximum(rows.sizes, 2.0 * floors)
@@ -255,8 +272,6 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
     measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
     levels = np.log(DISTURBANCES)
     logs: dict[tuple[int, ...], Floats] = {}
-    best = start
-    best_likelihood = -math.inf
     for sources in rows.disturbance_sets():
         starts = [np.append(row, level) for row in measured for level in levels] if sources else [np.log(middle)]
         if len(sources) == 2:
@@ -269,10 +284,8 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
         bounds = np.log([np.append(noise, [bound] * len(sources)) for noise, bound in ends]).T
         logs[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
-        if likelihood > best_likelihood + MIN_GAINS[1 in sources]:
-            best = noise_at(logs[sources], sources, leg_length_m)
-            best_likelihood = likelihood
-    return Noise(best.measurement, float(best.roughness_m), float(best.kick))
+        noise = noise_at(logs[sources], sources, leg_length_m)
+        yield Noise(noise.measurement, float(noise.roughness_m), float(noise.kick)), likelihood
 
 
 def climb(
@@ -291,7 +304,8 @@ def climb(
         return -restricted, -slope[free]
 
     likelihoods = evaluate(rows, noise_at(np.array(starts), sources, leg_length_m)).restricted
-    result = minimize(costs, starts[int(np.argmax(likelihoods))], method="L-BFGS-B", jac=True, bounds=bounds)
+    start = starts[int(np.argmax(likelihoods))]
+    result = minimize(costs, start, method="L-BFGS-B", jac=True, bounds=bounds, options=NOISE_SEARCH)
     return result.x, float(-result.fun)
 
 

@@ -41,18 +41,17 @@ def rigid_on_level_ground(
     Raises ValueError, with a message for the user, if the parts are not a walker with two legs.
     """
     check_legs(assembly)
-    models = [
-        swinging_first(each, gravity, knee_locked_at_strike, law)
-        for each in (assembly, replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1]))
-    ]
+    first = swinging_first(assembly, gravity, knee_locked_at_strike, law)
     if have_equal_legs(assembly):
-        return models[0]
-    if not knee_locked_at_strike and models[0].coordinates != models[1].coordinates:
+        return first
+    exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
+    second = swinging_first(exchanged, gravity, knee_locked_at_strike, law)
+    if not knee_locked_at_strike and first.coordinates != second.coordinates:
         raise ValueError(
             "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
         )
     # Lengths and falls are scaled by the length of leg 1. In the second model leg 1 is the stance leg.
-    return rigid_model.pair(models[0].changed(leg_length=models[1].leg_length), models[1])
+    return rigid_model.pair(first.changed(leg_length=second.leg_length), second)
 
 
 def swinging_first(
