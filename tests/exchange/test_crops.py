@@ -1,4 +1,4 @@
-"""Heel strikes of recordings that are cut anywhere, within stated errors: a sample of scripts/crop_campaign.py."""
+"""Check heel strikes of cut recordings against their stated errors: a sample of scripts/crop_campaign.py."""
 
 import importlib.util
 from pathlib import Path
@@ -24,14 +24,14 @@ def test_no_strike_of_a_cropped_recording_is_missed_invented_or_far_off(tmp_path
 
 
 def test_error_bar_of_a_strike_just_after_the_start_holds(tmp_path):
-    """Few samples before the strike bent the fit of those behind it."""
+    """The few samples before the strike once distorted the fit of the samples after it."""
     crops = campaign()
     for crop in (crops.Crop(1.39467, 4.218, 240.0, 1.75e-3, -1.0), crops.Crop(0.69340, 3.98, 25.0, 1.75e-4, -1.0)):
         counts = [crops.count_strikes(crop, np.random.default_rng(seed), tmp_path) for seed in range(6)]
         assert max(each.errors[0] for each in counts) < 5.0
 
 
-def test_a_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
+def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
     """The sample changed sides in each fit, so that the strike never came to rest."""
     crops = campaign()
     crop = crops.Crop(0.62168034, 4.26921954, 25.0, 1.75e-4, -1.0)

@@ -53,7 +53,7 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Describe the samples at `rows` (samples,) by their numbers in the file and their times."""
+    """Describe the samples where `rows` (samples,) is true by their numbers in the file and their times."""
 
     def spell_times(first: int, last: int) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
@@ -62,7 +62,7 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def spell_rows(rows: NDArray[np.bool_]) -> str:
-    """Describe the samples at `rows` (samples,) of a file by their numbers, which count from 1."""
+    """Describe the samples where `rows` (samples,) is true by their numbers, which count from 1."""
     return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
