@@ -303,7 +303,7 @@ def add_lines(
 
 
 def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
-    """Return the samples of a walk at `rows` (samples,)."""
+    """Return the samples of a walk where `rows` (samples,) is true."""
     kept = {name: values[rows] for name, values in walk.quantities.items()}
     return replace(walk, time_s=walk.time_s[rows], quantities=kept)
 

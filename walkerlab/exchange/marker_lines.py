@@ -230,7 +230,7 @@ def unseen_as_gaps(
 
 
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) that repeat a position (samples, axes) before it leaps to where it should have moved.
+    """Mark the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
 
     Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
     missing, because a foot may have stood still before the gap.

@@ -71,7 +71,7 @@ def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[in
 
 
 def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first and last sample of each stretch in which the same leg is far ahead."""
+    """Return the first and last sample of each stretch in which one leg stays far ahead of the other."""
     kind = np.where(apart, np.where(first_ahead, 1, -1), 0)
     bounds = np.flatnonzero(np.diff(kind)) + 1
     edges = zip((0, *bounds.tolist()), (*bounds.tolist(), kind.size), strict=True)

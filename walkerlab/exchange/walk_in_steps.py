@@ -309,7 +309,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 
 def alternates(first: Array, second: Array) -> bool:
-    """Whether the means of two samples differ clearly."""
+    """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
     if min(first.size, second.size) < FEWEST_ALTERNATING:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
@@ -475,7 +475,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for each end of a step, the row of its sample, the heel strike, and the rates on this side of it."""
+    """Return, for each end of a step, the row of its sample, the heel strike, and the rates within the step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
