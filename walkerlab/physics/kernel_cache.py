@@ -32,7 +32,7 @@ BUILT = PHYSICS / "machine_code"
 REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
 ABOUT = "about.json"  # in that folder: what its code depends on
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
-# For each platform: LLVM's names for the processor that builds are compiled for, and for the features it must have
+# for each platform: LLVM's names of the processor for which builds are compiled, and of the features that it must have
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "linux-x86_64": X86_64,
     "win32-amd64": X86_64,
@@ -156,7 +156,7 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def cache_root() -> Path:
-    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if usable, else a temporary one."""
+    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if usable, otherwise a temporary one."""
     chosen = os.environ.get("WALKERLAB_CACHE")
     default = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
     return _first_usable((Path(chosen), default) if chosen else (default,))
@@ -209,7 +209,7 @@ def cache_folder() -> Path:
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
-        # Only a new folder can make them too many.
+        # There can be too many folders only after a new one.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     # `_remove_unused` reads the time of the last use from the folder's time of change.
     os.utime(folder)
@@ -217,7 +217,10 @@ def cache_folder() -> Path:
 
 
 def _closed_to_others(folder: Path) -> Path:
-    """Close a folder to other users, delete code they may have written, and return it, or another if that fails."""
+    """Close a folder to other users, and delete code that they may have written.
+
+    Returns the folder, or a temporary one if that fails.
+    """
     try:
         deleted = make_private(folder)
     except OSError as error:

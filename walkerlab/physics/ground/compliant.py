@@ -25,7 +25,9 @@ class KneeRules:
     # With a compliant stop, thigh and shank of a locked knee stay separate bodies at the angle at which it latched.
 
     stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
-    release_at_touch: bool = False  # release the trailing knee at the touch, not when the leading foot stops sinking in
+    release_at_touch: bool = (
+        False  # whether to release the trailing knee at the touch or when the other foot has sunk in
+    )
 
 
 @dataclass(frozen=True)
@@ -33,14 +35,14 @@ class ContactDrives:
     """Torques at the hinges, and push-offs. By default there are none."""
 
     law: type[SpringDamper] = SpringDamper
-    fields: Mapping[str, Any] = field(default_factory=dict)  # of every form, as in `tree.write_fields`
+    fields: Mapping[str, Any] = field(default_factory=dict)  # fields to set in every form, as in `tree.write_fields`
 
 
 @dataclass(frozen=True)
 class Root:
     tree: parts.Tree
     constants: dict[str, Any]  # fields that have the same value in all forms with this root
-    rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
+    rows: dict[str, Floats]  # (..., n) fields whose values are summed if bodies turn together
 
 
 def contact_walker(

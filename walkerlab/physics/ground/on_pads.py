@@ -1,7 +1,7 @@
 """Walker on pads as an ordinary differential equation: the ground carries a foot wherever it is over a pad.
 
-This is the contact model as written for a general solver: one right-hand side without events. A foot need not come
-from above, and a walk never ends. Only the comparison with general solvers uses it.
+This is the contact model as one would write it for a general solver, with one right-hand side and without events. So a
+foot need not come from above, and a walk never ends. Only the comparison with general solvers uses this system.
 """
 
 from typing import Any, NamedTuple

@@ -48,7 +48,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     pinned: int  # index of the pinned foot; NO_FOOT in a free form
     kneed: bool
     has_knee: Integers  # (2,) whether each leg has a knee
-    release_at_touch: bool  # release the trailing knee at the touch, not when the leading foot stops sinking in
+    release_at_touch: bool  # whether the trailing knee is released at the touch or when the leading foot stops sinking
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
     rolling: Floats  # (2, n) m, radius of each ball in the column of its body, zero in all others

@@ -64,7 +64,7 @@ def walk_in_form(
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
-    # The next step size of the form before serves as the first one of this form.
+    # Begin with the step size that the walk's previous form would have used next.
     stepping.begin(method, system, method.clock[stepping.T], method.y, method.clock[stepping.H_NEXT])
     search = seek(deadline(system, walk_state, method.clock[stepping.T]), events.NO_EVENT)
     terrain = walk_state.ground.terrain
@@ -154,10 +154,10 @@ def approach(
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < MAX_REWINDS:
         return repeat(start + wait, event, latest, refinements + 1, search.rewinds + 1)
     if early and is_switching(event):
-        # the event function is too far from a polynomial on this solver step: try half of it
+        # Refinement does not help, so the event function is too far from a polynomial on this solver step: halve it.
         if search.rewinds < MAX_REWINDS:
             return repeat(0.5 * (start + end), event, latest, 0, search.rewinds + 1)
-        # a short solver step does not help either: ignore this event, but no other event in it
+        # A short solver step does not help either: let this one pass switching points, but no other events.
         walk_state.progress.passes_switching = True
         return repeat(end, event, latest, 0, 0)
     return accept(event, True)
@@ -222,7 +222,7 @@ def jumps_at_touch(system: OnGround) -> bool:
 def deadline(system: OnGround, walk_state: WalkState, t: float) -> float:
     """Compute the time (s) at which the step or a flight gets too long or the push-off ends, whichever is first."""
     by_step, by_flight = time_limits(walk_state)
-    # A rest shorter than the accuracy of event times counts as over.
+    # If the rest of the push-off is shorter than the accuracy of event times, the push-off counts as over.
     left = pulse_left(system, t)
     return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 

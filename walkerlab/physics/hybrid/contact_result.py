@@ -1,4 +1,4 @@
-"""A whole walk on compliant ground: an optional pinned first step, then the free walk, and the result of both."""
+"""A whole walk on compliant ground, with or without a pinned first step, and its result."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -180,8 +180,8 @@ def walk_on(
 ) -> Stopped:
     """Continue a walk from a state of the free walker, changing the form as knees lock and are released.
 
-    A `pinned` walk ends with its first step; `until` as in `walk_in_form`. The outcome is `SOLVER_FAILED` if the energy
-    balance does not close.
+    A `pinned` walk ends with its first step. `until` is as in `walk_in_form`. The outcome is `SOLVER_FAILED` if the
+    energy balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
     system = present_walker(walker, walk_state, pinned)
@@ -318,7 +318,7 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats)
     work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
     if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
         return work
-    # the hip has no damper if the knees have
+    # If the knees have dampers, the hip has none, so all work that is not done by the torque is theirs.
     return work._replace(hip=work.hip_torque, knees=work.hip - work.hip_torque)
 
 

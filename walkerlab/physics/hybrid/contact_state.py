@@ -30,10 +30,10 @@ PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
 EXTENSION = SLIDE + 1
 EXTENSION_RATE = SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
-# It has no event function, because it is due at a fixed time.
+# The end of a pulse has no event function, because it is due at a fixed time.
 PULSE_END = EVENT_FUNCTIONS
 NO_EVENT = -1
-# Row of the legs' relative angular velocity. It is no event, so it may have the number of PULSE_END, which has no row.
+# Row of the legs' relative angular velocity, which is no event. PULSE_END has no row, so the two may share a number.
 LEGS_TURN = EVENT_FUNCTIONS
 EVENT_ROWS = EVENT_FUNCTIONS + 1
 FARTHEST_SLIDE = 0.25  # largest slide of a stance foot's material from where it touched, as a fraction of the pitch

@@ -122,7 +122,10 @@ def next_foothold_counts(walk_state: WalkState, foot: int) -> bool:
 def set_foothold(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, y: Any
 ) -> int:
-    """Set the ground under a swing foot to its next foothold's height. On an ordinary plane, a foot below it stubs."""
+    """Set the ground under a swing foot to its next foothold's height.
+
+    On an ordinary plane, a foot that is below that height stubs.
+    """
     terrain = walk_state.ground.terrain
     set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     # Below its next foothold a foot finds no ground: it passes through a plane where the order of the feet matters, and
@@ -206,7 +209,6 @@ def touch(
     walk_state.leaving[foot] = 0
     walk_state.progress.last_touch = t
     walk_state.progress.stance = foot
-    # The step has ended, although the walk goes on.
     walk_state.progress.steps = step + 1
     find_ground(walk_state, stance, is_above(walk_state, stance))
     follow_strike(form, walk_state, stance)

@@ -28,7 +28,7 @@ BUDGET_OF_A_STEP = 50_000
 # friction coefficient, about as for rubber on dry concrete
 MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
-MAXIMA = ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio")  # of a tally and a result
+MAXIMA = ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio")  # fields of tally and result
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
 
@@ -121,8 +121,8 @@ def take_walk(
         judged_by = abs(rigid.swing_foot(walker, start)[1]) if step_length is None else step_length
         recorder.nearest = rigid_walk.SHORTEST_LANDING * judged_by
     height = rigid.swing_foot(walker, start)[0]
-    # A start in mid-step, where no foot leaves the ground. With its own height as the foothold that it leaves, the
-    # swing foot's event function is not taken for zero at the start.
+    # The walk starts in mid-step, so the swing foot leaves no foothold. Its own height takes the place of one, because
+    # otherwise its event function would be taken for zero at the start.
     if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
@@ -144,7 +144,7 @@ def is_straight(walker: RigidModel, start: State) -> bool:
 
 
 class Recorder:
-    """Recorder of a walk, which simulates blocks of steps and accumulates their records."""
+    """Simulates a walk in blocks of steps, and accumulates their records."""
 
     def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
         self.walker = walker
@@ -233,7 +233,7 @@ class Recorder:
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
         state = np.concatenate((observer.states[:count][kept], before, after))
         step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
-        # a knee that has not struck yet is free, unless it is locked from the start
+        # A knee that has not struck yet is free, unless it is locked from the start.
         until = np.append(np.where(np.isnan(knees), -np.inf, np.where(knees > self.time, knees, np.inf)), np.inf)
         bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
         order = np.argsort(time)
@@ -303,7 +303,7 @@ def driven_work(
     torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
     stored = [elastic_energies(laws[row], apart[1][row]) - elastic_energies(laws[row], apart[0][row]) for row in rows]
     hip = torque - float(np.sum(stored))
-    # the energy of the springs is counted as work of the hip
+    # The energy of the springs counts as work of the hip, so it must not count again in the energies.
     unsprung = walker.changed(laws=0.0) if walker.sprung else walker
     last = unsprung.exchanged if len(after) % 2 else unsprung
     ends = [

@@ -50,7 +50,7 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
+    # kg m^2. `unpaired` to `lean` are copies of the model's values, which save loading them in loops.
     unpaired: float
     mass: float  # kg
     radius: float  # m
@@ -66,7 +66,7 @@ class TwoLegs(NamedTuple):
 def two_legs(model: RigidModel) -> TwoLegs | None:
     """Convert a model of two equal straight legs with a linear hip for lanes, or return None for any other model."""
     hip = hinge_law(model, HIP_ROW)
-    # Laws of extensions are written for numbers, not for lanes.
+    # Laws of extensions are written for floats and may not work for lanes.
     if len(model.arm_x) != 2 or model.kneed or model.legs_differ or type(hip) is not SpringDamper:
         return None
     x, y = model.hip_x, model.hip_y
@@ -105,7 +105,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     r_1 = -along * U_1 - down * F_1
     r_2 = -along * U_2 - down * F_2
     M_12 = system.A[2] * cos_d + system.B[2] * sin_d
-    # Adding zero lanes makes lanes of a number: both branches below must give the variable one type.
+    # Adding zero lanes turns the number into lanes, because the variable must have one type in both branches below.
     M_22 = system.A[3] + 0.0 * cos_d
     if R != 0.0:
         pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
@@ -263,7 +263,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 
 @kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
-    """Compute a value, positive where a solver step of h (s) from y to `end` may contain a heel strike or a fall."""
+    """Compute a value that is positive if a solver step of h (s) from y to `end` may contain a strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start = feet_on_slope(walker, y[0], y[1])
     stop = feet_on_slope(walker, end[0], end[1])

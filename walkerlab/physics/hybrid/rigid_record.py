@@ -50,11 +50,13 @@ RIGID_TALLY = record_type(RigidTally, {})
 
 @pass_by_reference
 class Observer(NamedTuple):
-    """Record of a walk besides its heel strikes. It is empty unless `watching`."""
+    """Record of a walk besides its heel strikes. If not `watching`, it stays empty."""
 
     watching: bool
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 2 n) and any tangent columns: derivatives at a fixed time since the last heel strike
+    # (samples, 2 n, plus tangent columns if any). The columns are derivatives of the states at a fixed time since the
+    # last heel strike.
+    states: Any
     steps: Any  # (samples,) index of the step in which each sample lies
     # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
     tally: Any
@@ -117,7 +119,7 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     """Return the ground's pull (N), the friction ratio and the swing foot's depth (m). See section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
-    # The sign of the normal force is changed so that the worst of all three is a maximum.
+    # The pull is minus the normal force, so that the worst value of all three is a maximum.
     return -normal, ratio, -swing_foot(mode.model, y)[0]
 
 

@@ -148,8 +148,8 @@ def take_step(
 
     walker  as in `walk`; if the legs differ, leg 1 swings in even steps
 
-    Returns WALKED and the time of the heel strike, with the state before the strike in `method`; if the step fails,
-    returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
+    Returns WALKED and the time of the heel strike, and leaves the state before the strike in `method`. If the step
+    fails, returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
     """
     model = walker[step % walker.size]
     following = walker[(step + 1) % walker.size]
@@ -181,7 +181,7 @@ def swing_phase(
     method: Any, system: Mode, finder: CrossingFinder, observer: Any, t: float, y: Any, latest: float, step: int
 ) -> int:
     """Integrate up to the knee or heel strike that ends a phase, or to the time `latest` (s)."""
-    # A phase starts on the strike that ended the previous one; that zero is ignored.
+    # A phase starts at the strike that ended the previous one. `at_start` makes the search ignore that zero.
     limit = latest
     coming = False
     # After a knee strike the swing foot is in the air and the knee is no longer watched, so no event function starts at

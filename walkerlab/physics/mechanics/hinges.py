@@ -31,7 +31,7 @@ def legs_apart(system: Any, y: Any) -> tuple[float, float]:
 
 
 class HingeTorque(NamedTuple):
-    """Torque at a hinge, and its derivatives for the angle by which the first body is ahead and for its rate."""
+    """Torque at a hinge, and its derivatives with respect to the angle between the bodies and the rate of that angle."""
 
     resistance: float  # N m, turns the first body back and the second forward; the opposite of `SpringDamper.torque`
     elastic: float  # N m, the part that stores energy
@@ -54,7 +54,7 @@ def hinge_energy(law: Any, angle: float) -> float:
 
 
 class SpringDamper(NamedTuple):
-    """Spring that is relaxed at zero angle, damper, and constant torque. Other laws are classes derived from it."""
+    """A spring, relaxed at zero angle, with a damper and a constant torque. Other laws derive from this class."""
 
     stiffness: float  # N m/rad
     damping: float  # N m s/rad; a law dissipates energy only if it is not 0
@@ -120,7 +120,7 @@ def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
 @kernel_part
 def add_hinge_gradients(now: HingeTorque, body: int, other: int, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of a hinge's torques on its two bodies to by_angle and by_rate (n, n)."""
-    # The two torques are opposite, and depend on the difference of two angles.
+    # The two torques are opposite and depend only on the difference of the angles, so all terms differ only in sign.
     for row, sign in ((other, 1.0), (body, -1.0)):
         by_angle[row, body] += sign * now.by_angle
         by_angle[row, other] -= sign * now.by_angle

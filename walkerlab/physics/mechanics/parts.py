@@ -265,9 +265,9 @@ def followers(assembly: Assembly) -> dict[int, Floats]:
 
 
 def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Return the levers (bodies, 2) to the hip in m.
+    """Return the levers (bodies, 2) to the hip in m, from the point at which the levers `to_foot` start.
 
-    They start at the same point as `to_foot`, those to the first foot.
+    to_foot  (bodies, 2) levers to the first foot, m
     """
     # Without named legs, the first foot takes the place of the hip.
     if not all(assembly.legs):

@@ -31,7 +31,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     """Constants of the rigid model in SI, a structured scalar whose type fixes the number n of bodies."""
 
     # E holds three reductions: BENT, STRAIGHT and AT_STRIKE. If the legs differ, `paired_with` is the model in which
-    # the other leg swings. It is no field of the record: a kernel takes both records, see `models_in_turn`.
+    # the other leg swings. It is no field, because kernels take both models as an array, see `models_in_turn`.
     paired_with = cast("RigidModel | None", None)
 
     foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
@@ -98,7 +98,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
         return restored, (np.asarray(self), self.paired_with)
 
     def changed(self, **fields: Any) -> "RigidModel":
-        """Return a read-only copy with some fields changed. Of legs that differ, both models are changed."""
+        """Return a read-only copy with some fields changed. If the legs differ, both models are changed."""
         model = replace_fields(self, fields)
         return model if self.paired_with is None else pair(model, replace_fields(self.paired_with, fields))
 
@@ -266,7 +266,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
         by_rate = matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
-            # from here on alpha holds d alpha, the solution of E^T M' E d alpha = E^T (dr' - dM' alpha)
+            # The state no longer needs alpha. Now it holds d alpha, from E^T M' E d alpha = E^T (dr' - dM' alpha).
             for k in range(n):
                 total = 0.0
                 for l in range(n):
@@ -380,8 +380,11 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J) the total mass would have at the contact point of a leg at `touched` (rad)."""
-    # zero is at the same height as in `energies`
+    """Compute the potential energy (J) of the total mass at the point where a foot touches down.
+
+    touched  rad, angle of the leg at its touch
+    """
+    # The zero is that of `energies`, so that the two can be subtracted.
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
@@ -395,7 +398,10 @@ def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the results of `swing_foot` and their changes due to `turn` (n,): m for angles (rad), m/s for rates."""
+    """Compute height and distance of the swing foot (m), and how they change if the bodies turn by `turn` (n,).
+
+    If `turn` is in rad/s, the changes are velocities (m/s).
+    """
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     tree.sines_cosines(model, n, y, s, c)

@@ -26,16 +26,16 @@ REPEAT_DISTANCE = 1e-5  # points closer than this count as equal
 NEAR_REPEAT = 1e-3
 MAX_APPROACH_RATIO = 0.8
 GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
-MAX_BLOCKS = 64  # per walk
+MAX_BLOCKS = 64  # blocks per walk
 MIN_BLOCKS = 10
 BLOCK_LENGTH = 5.0  # in correlation times
-MAX_WALKS = 8  # walks per exponent
+MAX_WALKS = 8  # maximum number of walks per exponent
 # largest difference between the means of a walk's halves, in standard errors of the whole walk's mean; the standard
 # error of the difference is twice as large
 MAX_DRIFT = 4.0
 SUBSTEPS = 8
 LOSS_HALVINGS = 6
-MAX_CLOSE_RETURNS = 4  # seeds per period
+MAX_CLOSE_RETURNS = 4  # maximum number of seeds per period
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +193,7 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
         for _ in range(MAX_CLOSE_RETURNS):
             nearest = int(np.argmin(misses))
             seeds.append(Seed(points[nearest], attractor.value, period))
-            # Its neighbours on the orbit return nearly as closely, and would lead to the same gait.
+            # The neighbours of this point on the orbit return nearly as closely, and would lead to the same gait.
             misses[max(0, nearest - 2 * period) : nearest + 2 * period] = np.inf
     return seeds
 

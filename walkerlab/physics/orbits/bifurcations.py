@@ -177,7 +177,9 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
     """Predict a point x (d + 1,) of the doubled branch.
 
-    Return it, the normal of the correction plane, and the amplitude.
+    Returns x, the normal of the plane on which x is to be corrected, and the amplitude.
+
+    share  fraction of the amplitude of the normal form
     """
     xi = share * form.amplitude
     # The gait of twice the period has -(1 + rate s) xi + cubic xi^3 = -xi.

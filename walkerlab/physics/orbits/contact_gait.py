@@ -43,7 +43,7 @@ class GaitAnswer:
 def find_gait_from(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State, legs_differ: bool = False
 ) -> GaitAnswer:
-    """Search for the contact gait near a free walker's state with both feet on the ground, or state why it fails."""
+    """Search for the contact gait near `start`, a state of the free walker with both feet on the ground."""
     pitches_m = [ground.terrain.pitch] * (2 if legs_differ else 1)
     excluded = why_no_gait(walker)
     if excluded:
@@ -170,5 +170,5 @@ def follow_from_rigid(
 
 
 def append_length(gait: Cycle) -> Floats:
-    # The pitch of the pads is followed together with the gait.
+    # The pitch of the pads must be followed together with the gait, because steps get shorter on softer ground.
     return np.append(gait.z, gait.lengths_m)

@@ -68,7 +68,7 @@ def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
-    # if only one leg has a knee, there are fewer where that leg stands
+    # If only one leg has a knee, there is one body fewer while that leg stands.
     locked = locked_shank(walker, stance)
     # `legs` repeats the last body of a leg without a knee, and `dict.fromkeys` drops the repetition.
     bodies = (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
@@ -135,7 +135,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 
 
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
-    """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
+    """Return z changed so that the stance foot rests on the ground at its static penetration."""
     foot = forms.feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
     depth = walker.normal.resting_foot(walker.mass * walker.gravity_down, walker.mass).depth
     along_rate = 1 + len(angled_bodies(walker, stance))
@@ -253,7 +253,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
-        # With room for a single touchdown, the walk stops there for the push.
+        # With room for a single touchdown, the walk stops there, and the push can be applied.
         stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(
             forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
@@ -261,7 +261,7 @@ def walk_from_section(
         stopped = replace(stopped, state=pushed)
     landed = list[float]()
     differ = have_different_soles(walker)
-    # the angles of legs with different soles do not follow from the footholds, so that the walk stops at each of them
+    # If the soles differ, angles do not follow from the footholds. So the walk stops at each touchdown to read them.
     for touches in range(2, steps + 1) if differ else ():
         if stopped.outcome is Outcome.WALKED:
             stopped = go_on(shorten(walk_state, touches), stopped.state)
@@ -286,7 +286,7 @@ def walk_from_section(
 
 
 def have_different_soles(walker: ContactWalker) -> bool:
-    """Whether the feet of the straight legs differ in radius or in the place of their centres relative to the hip."""
+    """Whether the feet of the straight legs differ in radius or in the position of the centre relative to the hip."""
     whole = walker.whole
     first, second = (
         [whole.radius[k], *((f[k] - f[1 - k])[np.unique(walker.legs[k])].sum() for f in (whole.foot_x, whole.foot_y))]
@@ -304,7 +304,10 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 def sample_legs_from_section(
     site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats, stance: int
 ) -> Floats:
-    """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
+    """Sample the leg angles (times, 2) in a walk like that of `walk_from_section`. The first stance leg is column 0.
+
+    times  s, from the start on the section
+    """
     walker = site.walker
     start = state_on_section(walker, z, stance)
     walk_state = walk_state_on_section(with_footholds(site, heights), start, heights.size, stance)
@@ -383,7 +386,7 @@ class ContactMap(StepMap):
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     disturbs_after = 1
-    # small compared with the penetration of stiff ground, which is below 0.01 mm
+    # It must be small compared with the penetration of stiff ground, which is below 0.01 mm.
     probe = 1e-6
 
     def __init__(
@@ -395,10 +398,13 @@ class ContactMap(StepMap):
         like: WalkerOnGround,
         first: int = 0,
     ) -> None:
-        """Prepare a family's map. `walker_at` returns the walker at a parameter value, or None if it is invalid. Units
-        are those of `like`.
+        """Prepare the map of a family of walkers.
 
-        first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
+        walker_at      function from the parameter to a walker, or to None if the value gives no valid walker
+        scale          magnitude of significant changes of the parameter
+        step_length_m  step length of a gait, which is the pitch of the plane that replaces pads
+        like           walker of the family that gives the units
+        first          leg that swings in even steps: 0 for leg 1, 1 for leg 2
         """
 
         @lru_cache(maps.CACHE_SIZE)
@@ -464,8 +470,8 @@ class ContactMap(StepMap):
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         start = z * self._units[swing % 2]
         walk = walk_from_section(site, endless, start, heights_m, push_N_s, self._stance(swing))
-        # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
-        # units.
+        # If the sections of both legs have different sizes, the size shows which leg stands. Otherwise both have the
+        # same units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:
@@ -485,7 +491,7 @@ class ContactMap(StepMap):
         if stride.outcome is not Outcome.WALKED:
             return None
         works = [step.driven for step in stride.steps if isinstance(step, SectionStep)]
-        # the knees' work, the last field, may be None and does not count
+        # The last field, the knees' work, may be None. It does not count in the cost.
         sums = (math.fsum(each) for each in zip(*(work[1:-1] for work in works), strict=True))
         return DrivenWork(works[0].weight, *sums).cost_of_transport(math.fsum(stride.lengths_m))
 

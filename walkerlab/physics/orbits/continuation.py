@@ -27,7 +27,7 @@ from walkerlab.physics.orbits.newton import (
 )
 from walkerlab.physics.solvers.system import Floats
 
-FEW_CORRECTIONS = 3
+FEW_CORRECTIONS = 3  # the next step is longer if no more Newton corrections than this were needed
 ROOT_RESOLUTION = 1e-14  # absolute, in arclength
 # (abscissa, solution) pairs, latest last
 Points = tuple[tuple[float, Floats], ...]
@@ -122,8 +122,7 @@ def correct(
     if isinstance(solution, NotConverged):
         return solution
     try:
-        # The equations do not change along the solution of this system, and it leaves the plane on the side of its
-        # normal.
+        # The solution of this system is tangent to the curve, and points to the same side of the plane as its normal.
         direction = np.linalg.solve(solution.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)

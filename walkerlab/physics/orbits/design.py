@@ -15,7 +15,7 @@ from walkerlab.physics.solvers.system import Floats
 
 PRECISION = 1e-9  # a search ends when the quantity changes by less than this, relative to its initial value
 MAX_DESIGN_ITERATIONS = 60
-BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer to a bound count as on it
+BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer than this to a bound count as on it
 SAME_OPTIMUM = 1e-4  # searches that end closer than this fraction of the range found the same optimum
 PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values of the quantity per squared range
 
@@ -24,7 +24,7 @@ PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values of the qu
 class Point:
     numbers: Mapping[str, float]
     gradients: Mapping[str, Floats]
-    apart: float = 1.0  # gap between the magnitudes of the two largest multipliers
+    apart: float = 1.0  # difference between the magnitudes of the two largest multipliers
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from walkerlab.physics.solvers.system import Floats
 
 SAME_STATE = 1e-6  # states closer than this count as equal
 AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled branch
-MAX_MULTIPLIER_CHANGE = 0.6  # change of a multiplier near the unit circle from one point of a branch to the next
+MAX_MULTIPLIER_CHANGE = 0.6  # largest change of a multiplier near the unit circle from one point to the next
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
 SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
 CLOSED_LOOP = "returns to its first point"
@@ -103,7 +103,7 @@ class GaitBranch:
             if gait.stable:
                 values.append(gait.value)
             if gait.stable != following.stable:
-                # Where no bifurcation was located, stability changes somewhere between the two points.
+                # If no bifurcation was located between the two points, assume the change halfway.
                 on_it = (b.value for b in self.bifurcations if b.lies_between(gait, following))
                 edge = next(on_it, 0.5 * (gait.value + following.value))
                 if stable:
@@ -150,7 +150,7 @@ class BranchTracer:
     step_map: StepMap
     span: ValueSpan
     control: StepControl = field(default_factory=StepControl)
-    max_points: int = MAX_BRANCH_POINTS  # on a branch
+    max_points: int = MAX_BRANCH_POINTS  # per branch
     advance: Callable[[], None] = lambda: None  # called after each point
 
     def equations(self, period: int) -> GaitEquations:
@@ -313,7 +313,7 @@ class BranchFollower(BranchTracer):
                     (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
                     (*reversed(behind.crossings), *branch_ahead.crossings),
                 )
-            # `lies_on` misses gaits beyond a branch's ends, so known gaits are also sought on the new branch.
+            # `lies_on` misses a gait just beyond the end of a known branch. So drop branches that the new one covers.
             within = [branch for branch in like if self.covers(branch_ahead, branch)]
             if all(branch.reach < branch_ahead.reach and branch not in previous for branch in within):
                 branches = [*(branch for branch in branches if branch not in within), branch_ahead]
@@ -333,7 +333,7 @@ class BranchFollower(BranchTracer):
 
     def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
         """Whether `branch` covers `other`, judged by the gait a quarter of the way along `other`."""
-        # half of the way along may be a fold, near which gaits of both arms are hardly distinct
+        # Halfway along there may be a fold, where the gaits of its two arms are hard to tell apart.
         covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
         return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
 
@@ -356,7 +356,7 @@ class BranchFollower(BranchTracer):
         """Return the first gait of twice the period, at the normal form's amplitude, or None if Newton's
         method fails.
         """
-        # the tangent must point away from the flip: the halves of the cycle must move apart along it
+        # The tangent must point away from the flip, so the halves of the cycle must move apart along it.
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)

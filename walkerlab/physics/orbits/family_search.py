@@ -72,7 +72,7 @@ THOROUGHNESS = {
         curve_periods=4,
         other_gaits=True,
     ),
-    # a step on compliant ground takes a thousand times as long, so there are far fewer of them
+    # A step on compliant ground takes a thousand times as long, so the search makes do with far fewer steps.
     CONTACT: Thoroughness(
         values=24,
         transient=40,
@@ -125,7 +125,7 @@ class FamilySearch:
 
     @property
     def steps_are_alike(self) -> bool:
-        """Whether all steps are of equal legs, as the search for attractors needs."""
+        """Whether the legs are equal, which the search for attractors assumes."""
         return self.step_map.stride == 1
 
     def announce(self, what: str, total: int | None = None) -> None:

@@ -133,7 +133,7 @@ def select_straight(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
 
 
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
-    """Walk the steps of a gait of the unit walker and measure them in SI, or None if a step fails."""
+    """Walk the steps of a gait of the unit walker and measure them in SI units. Return None if a step fails."""
     start = rigid_map.state_on_section(walker, gait.z)
     count = len(gait.steps)
     step = take_walk(walker, rigid_map.EXACT_STEPS, start, count, sampled=True)
@@ -338,8 +338,8 @@ def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> rigid_map.Rigi
 
 
 def average_legs(walker: RigidModel, share: float) -> RigidModel:
-    """Return the walker with its legs' differences from their mean times `share`. At 0 it has equal legs."""
-    # The constants of both models enter the equations linearly, so all walkers between them are possible.
+    """Return the walker with only the fraction `share` of the difference between its legs. At 0 the legs are equal."""
+    # The constants of both models enter the equations linearly, so every mean of them is a valid walker.
     models = walker, walker.exchanged
 
     def blend_models(k: int) -> RigidModel:
@@ -415,7 +415,7 @@ class Search:
                 self.lost.append(f"the {name} is lost at {state.value:.0%} of the difference between the legs")
 
     def follow_drive(self, generator: np.random.Generator, starts: int) -> None:
-        # imported late, because it is needed only if other searches fail
+        # Imported here, because it is needed only if other searches fail.
         from walkerlab.physics.orbits.families import BranchFollower, Seed, ValueSpan
 
         goal = self.walker
@@ -471,7 +471,10 @@ class Search:
         return bool(abs(rigid.feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
-        """Solve for the gait near z to rounding error and record it, and return whether a gait was found."""
+        """Solve for the gait near z to rounding error, and record it as found by the search `by`.
+
+        Returns whether there is a gait.
+        """
         if self.record_hit(z, by):
             return True
         effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
@@ -488,7 +491,7 @@ class Search:
         return True
 
     def record_hit(self, z: Floats, by: str) -> bool:
-        """Whether z is a known gait. If so, record that this search found it again."""
+        """Whether z is a known gait. If so, record that the search `by` found it again."""
         for record in self.records:
             if np.abs(record.cycle.z - z).max() < SAME_GAIT * np.abs(z).max():
                 record.by.append(by)
@@ -509,7 +512,7 @@ class Search:
 
 def preference(gait: RigidGait) -> tuple[bool, int, float]:
     """Return a sort key, smallest for the gait to walk: stable, fewest swings, then fastest decay of disturbances."""
-    # If a leg swings back, its foot passes through the ground, which the model ignores.
+    # With several swings in a step, the foot passes through the ground several times, which the model ignores.
     return not gait.stable, gait.swings, gait.spectral_radius
 
 

@@ -38,14 +38,14 @@ STEP_QUANTITY_COUNT = 3  # number of quantities, the first ones, that follow fro
 MIN_EIGENVECTOR_PRODUCT = 1e-6
 STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
 APPROACH_STEPS = (1e-4, 1e-2)  # multiples of that step, to find the direction of the family
-STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # multiples of that step, tried in turn
+STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # multiples of that step, tried in turn for the derivatives
 SMALL_ERROR = 1e-3  # relative error at which no smaller step is needed
 LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative and its error. `why` explains a missing derivative, or warns that rounding dominates it."""
+    """Derivative of a quantity, and its error. `why` says why there is none, or warns that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -61,7 +61,7 @@ class Gradient:
 
 def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
     """Compute the quantities of a gait by name, without norms if it is unstable, or return None if its step fails."""
-    # only the quantities in `selection`, because those that need more than a single step are expensive
+    # Compute only the quantities in `selection`, because those that need more than a single step are expensive.
     stride = gait.stride(gait.z, gait.p)
     if stride.outcome is not Outcome.WALKED:
         return None

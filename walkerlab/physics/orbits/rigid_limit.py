@@ -1,7 +1,7 @@
 """Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
 
 The parameters are stiffness k, damping c and stiction velocity v_s. The full-damping penetration d_max shrinks with the
-static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if they vary together.
+static penetration as k grows, and the friction velocity v_d with v_s. If all three vary, push-offs are shortened, too.
 """
 
 import math
@@ -34,8 +34,8 @@ WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
 SERIES_EFFORT = CONTACT_EFFORT._replace(max_evaluations=30)
-# duration of a push-off divided by sqrt(d / g), where d is the static penetration: so short a push-off ends while the
-# other foot is still landing
+# Duration of a push-off divided by sqrt(d / g), where d is the static penetration. So short a push-off ends while the
+# other foot is still landing.
 PUSH_OFF_FACTOR = 0.1
 
 
@@ -74,13 +74,13 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """Return the walker on the ground of a setting, with a shortened push-off if the series varies all parameters."""
+    """Return the walker on the ground of a setting. If the series varies all parameters, shorten its push-off."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed = scale_laws(walker, *setting[2:])
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass).depth
-    # From the config's ground on, the push-off shortens with the square root of the stiffness.
+    # The duration is inversely proportional to the square root of the stiffness, but at most the config's.
     brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
@@ -89,7 +89,7 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
 class Distance:
     """How far gait and walk at one contact setting are from the rigid ones, with numerical errors."""
 
-    # Quantities of the walk are None if no walk is compared.
+    # `angle` and the fields after it describe the walk. They are None if no walk is compared.
 
     setting: ContactFactors
     period: float  # s
@@ -110,7 +110,7 @@ class Distance:
 
 @dataclass(frozen=True)
 class Limit:
-    """Ground and rigid reference of a series: the rigid gait and the walk from the rigid start."""
+    """Ground of a series, and what its settings are compared with: the rigid gait and the walk from the rigid start."""
 
     ground: JudgedGround
     period_s: float
@@ -124,7 +124,7 @@ class Limit:
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
         """Return the distances along a series until a gait is lost. With a `start`, compare walks as well."""
-        # each gait is the guess for the next
+        # Each gait is Newton's first guess for the next one.
         distances: list[Distance] = []
         for setting in series_settings(name, self.every):
             changed = apply_setting(walker, setting)
@@ -201,7 +201,7 @@ def solver_settings(tolerance: float) -> Tolerances:
 
 
 def observed_orders(distances: list[Distance]) -> list[float]:
-    """Return the observed orders of convergence of the period, one for every three successive settings."""
+    """Return the observed orders of convergence of the period, each from three successive settings."""
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
@@ -220,8 +220,11 @@ class Extrapolation:
 
 
 def extrapolate(distances: list[Distance]) -> Extrapolation | None:
-    """Extrapolate the period by Aitken's method from the last resolved settings, or None if they do not converge."""
-    # Settings are ignored from the first one whose change of the period is below its numerical error.
+    """Extrapolate the period by Aitken's method from the last resolved settings.
+
+    Returns None if the periods do not converge.
+    """
+    # From the setting on whose change of the period is below its numerical error, changes are only noise.
     periods = np.array([distance.period for distance in distances])
     errors = np.array([distance.numerical_period for distance in distances])
     unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])

@@ -45,16 +45,16 @@ from walkerlab.physics.solvers.system import Floats, Integers, State
 
 WalkerAt = Callable[[float], RigidModel | None]
 STEP_WALKED = int(Outcome.WALKED)
-# Scale of the variational columns. They are exactly linear and need fewer digits than the state. With an absolute
-# tolerance of a tenth of the relative one they keep about three digits fewer, which halves the number of solver steps.
+# The variational columns are linear and need fewer digits than the state. Scaled down by this, they keep about three
+# digits fewer (with an absolute tolerance of a tenth of the relative one), which halves the number of solver steps.
 TANGENT_SCALE = 2.0**-13
 SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
 EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
-KEPT_METHODS = 4  # one for each number of tangent columns
-LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this time
+KEPT_METHODS = 4  # number of solver methods to keep, one for each number of tangent columns
+LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples are taken here, so that none falls after the heel strike
 # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
 SHORTEST_STEP = 0.05
 # Newton's method from random starts
@@ -65,7 +65,7 @@ NEAR_RESIDUAL = 1e-6
 # the distance to this fraction or less.
 RECOGNITION_DISTANCE = 0.1
 RECOGNITION_RESIDUAL = 0.1
-# results other than the index of a known gait
+# results of `solve_starts` other than the index of a known gait
 NEW_GAIT = -1
 NO_GAIT = -2
 
@@ -79,7 +79,7 @@ class StrikeSection(NamedTuple):
     start: Any  # (2 n (1 + d),) the state at z = 0, with its variational columns
     basis: Any  # (d, 2 n)
     places: Any  # (d (1 + d),) indices of z in the state, then in each column
-    # model whose legs have different lengths or soles, so that the angles on the section are no linear function of z
+    # the model if its legs differ in length or sole, because angles on the section are then not linear in z
     curved: RigidModel | None
 
 
@@ -171,9 +171,9 @@ class StepTangents(NamedTuple):
     end: Floats  # (m,) state before the heel strike
     rates: Floats  # (times, 2) rates of swing and stance leg at the sample times
     waits: Floats  # (m + 1,) derivatives of the duration
-    before: Floats  # (m + 1, m) of the state before the heel strike
-    after: Floats  # (m + 1, m) of the state after it
-    samples: Floats  # (times, m + 1, 2) of the angles of swing and stance leg at the sample times
+    before: Floats  # (m + 1, m) derivatives of the state before the heel strike
+    after: Floats  # (m + 1, m) derivatives of the state after it
+    samples: Floats  # (times, m + 1, 2) derivatives of the angles of swing and stance leg at the sample times
 
 
 class Memory(NamedTuple):
@@ -244,7 +244,7 @@ class RigidStepper(local):
         """Walk until `strikes` is full or the walk ends, and return the outcome and the number of completed steps."""
         method.counts[:BUDGET] = 0
         method.counts[BUDGET] = min(strikes.time.size * self.budget, ENDLESS)
-        # The method chooses its first step itself, so a result does not depend on the walk before.
+        # Let the method choose its first step: the last step of an earlier walk would change the result.
         method.clock[H_NEXT] = 0.0
         status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
         return Outcome(status), completed
@@ -255,7 +255,7 @@ class RigidStepper(local):
         """Differentiate a step with respect to its start (2 n,) and its foothold's rise. Return None if it fails.
 
         floor  rises (2,) and nearest landing, as in `HeelStrikes`
-        times  of samples, from the start of the step
+        times  (times,) times of samples, from the start of the step
         """
         m = start.size
         # One column for each value of the start, and a zero column for the rise.
@@ -359,7 +359,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
             solve(system, memory.pivots, move, 0, d)
         else:
             share *= 0.5
-            # The start itself leads to no step.
+            # Give up if the start itself leads to no step.
             if least == NO_RESIDUAL or share < SMALLEST_MOVE:
                 return NO_GAIT
         for i in range(d):
@@ -376,8 +376,8 @@ def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
 def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Floats:
     """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
 
-    Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
-    there. s makes such a change as large as the rates, on average.
+    Multiplied by independent standard normal numbers, they change the rates with covariance s^2 M^-1, where M is the
+    mass matrix of the rates that are free there. The factor s makes the change as large as the rates, on average.
     """
     free = section.basis[1:]
     rates = coordinates_of(walker, start)[1:]
@@ -387,7 +387,7 @@ def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Flo
 
 
 class LegSwing(NamedTuple):
-    """A leg's swing: the model and the section at its start, and what the length of its step depends on."""
+    """Swing of one leg: the model, the section at its start, and the dimensions that give the length of its step."""
 
     walker: RigidModel
     section: StrikeSection
@@ -396,7 +396,7 @@ class LegSwing(NamedTuple):
     levers: list[tuple[float, float]]  # from each body to the swing foot
 
     def step_length(self, before: float, end: Floats) -> float:
-        """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
+        """Return a step's length from the stance leg's angle `before` (rad) at its start and the state at its `end`."""
         angles = end[: len(self.levers)].tolist()
         ahead = self.radius * (before - angles[rigid.STANCE])
         for angle, (x, y) in zip(angles, self.levers, strict=True):
@@ -405,7 +405,7 @@ class LegSwing(NamedTuple):
         return float(ahead)
 
 
-def floats_of(walker: RigidModel) -> tuple[float, float, list[tuple[float, float]]]:
+def leg_dimensions(walker: RigidModel) -> tuple[float, float, list[tuple[float, float]]]:
     """Return the slope, the radius of the stance foot, and the levers to the swing foot."""
     levers = list(zip(walker.foot_x.tolist(), walker.foot_y.tolist(), strict=True))
     return float(walker.slope), float(walker.radius), levers
@@ -467,7 +467,7 @@ class SimilarWalker(NamedTuple):
             return None
         starts = np.vstack((state_on_section(self.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
-        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
+        # No kicks at the start, because changes of the start are columns of `along`, and none after the last step.
         kicks = [unit_kicks(*self.swinging(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
@@ -520,7 +520,12 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is any walker."""
+        """Prepare the map of a family of walkers.
+
+        walker_at  function from the parameter to a walker, or to None if the value gives no valid walker
+        scale      magnitude of significant changes of the parameter
+        like       any walker of the family
+        """
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:
@@ -532,7 +537,7 @@ class RigidMap(StepMap):
             n = len(unit.arm_x)
             feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
             walkers = (unit, unit.exchanged) if unit.legs_differ else (unit,)
-            swings = tuple(LegSwing(each, strike_section(each), *floats_of(each)) for each in walkers)
+            swings = tuple(LegSwing(each, strike_section(each), *leg_dimensions(each)) for each in walkers)
             rolling = float(unit.radius), float(-section.start[rigid.SWING])
             return SimilarWalker(unit, units, section, swings, feet.tolist(), *rolling)
 

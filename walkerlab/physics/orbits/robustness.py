@@ -5,8 +5,8 @@ step and an indicator e of the step, both minus the gait's values,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
-If the legs differ, A is the derivative of a stride, e' holds both its steps, and a disturbance of one leg's step is
-another than that of the other leg's.
+If the legs differ, A is the derivative of a stride, e' holds the indicators of both its steps, and the norm depends on
+the leg whose step is disturbed.
 
 A drop takes the state off the section of even ground for two steps, so the first terms of the sum are difference
 quotients of exact walks, and the derivative on even ground gives the rest.
@@ -41,7 +41,7 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
 """For each largest survived disturbance, its kind and its sign."""
 INDICATORS = ("step_period", "step_length", "speed")
 DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks: a stride, if the legs differ
-# Offsets and weights of fourth-order formulas for a first derivative, the most accurate first.
+# offsets and weights of fourth-order formulas for a first derivative, the most accurate first
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
@@ -85,7 +85,10 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order, one-sided if one side lacks values, or None if both do."""
+    """Differentiate a function at 0 to fourth order, from one side if the function has no values on the other.
+
+    Returns None if it lacks values on both sides.
+    """
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -135,7 +138,10 @@ def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and response of the disturbed step, or None if a walk falls. `times` scales the difference step."""
+    """Return the norms and the response of the disturbed step, or None if a walk fails or the gait is unstable.
+
+    times  factor on the difference step
+    """
     d, h = gait.z.size, times * gait.step_map.probe
 
     def step_after(size: float) -> Floats | None:

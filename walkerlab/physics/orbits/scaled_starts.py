@@ -109,8 +109,8 @@ def scaled_starts(
 @dataclass(frozen=True)
 class Margin:
     name: str  # scaled velocities and direction of the change
-    factor: float  # last factor at which the start walks
-    fails: StartTrial | None  # first failure beyond `factor`; None if the start walks up to the limit
+    factor: float  # last factor at which the start leads to walking
+    fails: StartTrial | None  # first failure beyond `factor`; None if there is none up to the limit
 
 
 SCALING_DIRECTIONS = (
@@ -129,7 +129,11 @@ def margins(
     step: float = MARGIN_STEP,
     largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
-    """Find how far the velocities of a start that walks may be scaled, alone and together, up to `largest`."""
+    """Find how far the velocities of a start may be scaled, alone and together, until it no longer leads to walking.
+
+    around   factors on the velocities of swing and stance leg that lead to walking
+    largest  largest factor tried
+    """
     # Factors are `step` apart until one fails; then the last interval is bisected.
     results = []
     for name, *direction in SCALING_DIRECTIONS:
@@ -167,7 +171,7 @@ class Adjustment:
 def smallest_change(
     starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
 ) -> Adjustment | None:
-    """Find the start nearest to (1, 1) that walks, on successively finer grids around the nearest walking candidate.
+    """Find the start nearest to (1, 1) that leads to walking, on finer and finer grids around the nearest candidate.
 
     starts      starts with the config's solver tolerances
     quick       the same starts with the map's tolerances; the result walks with both

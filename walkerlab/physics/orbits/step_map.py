@@ -23,10 +23,10 @@ from walkerlab.physics.solvers.system import Floats
 Walker = TypeVar("Walker")
 PARAMETER_STEP = 1e-3  # relative step of the parameter in difference formulas
 CACHE_SIZE = 4096  # walkers cached per step map
-# Offsets and weights of second-order formulas for a first derivative.
+# offsets and weights of second-order formulas for a first derivative
 CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
-identity = lru_cache(np.eye)  # shared, so never written to
+identity = lru_cache(np.eye)  # The matrices are shared, so never write to them.
 no_values = partial(np.zeros, 0)
 NO_TIMES = np.zeros(0)
 VARIATION = 1e-6  # difference step of section coordinates, and of heights (m)
@@ -68,8 +68,8 @@ class DisturbedWalk:
     """A walk from the section over uneven ground, or after a push."""
 
     outcome: Outcome  # WALKED if every step was completed
-    durations_s: Floats  # (steps,) between heel strikes
-    lengths_m: Floats  # (steps,) distances
+    durations_s: Floats  # (steps,) times between heel strikes
+    lengths_m: Floats  # (steps,) distances walked
     angles_rad: Floats  # (steps,) angle of the stance leg from the vertical, just after each heel strike
     z: Floats  # (d,) last point on the section
 
@@ -97,7 +97,7 @@ class Stepper(Protocol):
 
 
 class StepMap(Stepper, Protocol):
-    """Step of a walker from section to section, with the derivatives and limits that continuation needs."""
+    """Step of a walker from section to section, with what continuation needs besides: derivatives and limits."""
 
     names: tuple[str, ...]  # names of the section coordinates, which are all of magnitude one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures
@@ -113,9 +113,10 @@ class StepMap(Stepper, Protocol):
     def take_disturbed_walk(
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        """Walk from z (d,) over heights (steps + 1,) from the present foothold on, after a hip push along the slope.
+        """Walk from z (d,) over uneven ground, after a push at the hip along the slope.
 
-        swing  as in `Stepper.step`
+        heights_m  (steps + 1,) heights of the footholds, beginning with the present one
+        swing      as in `Stepper.step`
         """
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
@@ -167,7 +168,7 @@ class StepMap(Stepper, Protocol):
     def replace_tolerances(self, tolerances: Tolerances) -> StepMap: ...
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
-        """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
+        """Walk up to `steps` steps from z (d,). If there is a tangent (d,), multiply it by each step's derivative."""
         completed = list[MappedStep]()
         lengths = list[float]()
         outcome = Outcome.WALKED
@@ -195,12 +196,12 @@ class StepMap(Stepper, Protocol):
 def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: int = 0) -> tuple[Outcome | None, Floats]:
     """Return the outcome of steps from z (d,) at values near p, and the derivative (d,) of a step with respect to p."""
     # This second-order difference only steers predictors and Newton's method and enters no result.
-    # Relative to a value below the scale, so that the differences do not reach beyond zero.
+    # Near zero, h is relative to p, because a parameter such as a mass must not become negative.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, False, swing) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
-        # Values on this side give no valid walker or start, so the next formula is tried.
+        # If a value gives no valid walker or start, the next formula uses values on another side.
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
@@ -295,7 +296,10 @@ class Cycle:
 
 
 def walk_steps(step_map: Stepper, z: Floats, p: float, n: int, derived: bool = True, first: int = 0) -> Cycle:
-    """Take n steps from z (d,) at p, with their derivative if `derived`. `first` is `swing` of the first step."""
+    """Take n steps from z (d,) at parameter p, and compute their derivative if `derived`.
+
+    first  argument `swing` of the first step; it grows by one each step
+    """
     steps: list[MappedStep] = []
     position = z
     DP = identity(z.size)
@@ -310,7 +314,7 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int, derived: bool = T
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """Return the cycle with its derivative `Dp`, or with the outcome if a step fails at a nearby parameter value."""
+    """Return the cycle with its derivative `Dp`. If a step fails at a nearby value, return it with that outcome."""
     position = cycle.z
     Dp = 0.0 * cycle.z
     for swing, step in enumerate(cycle.steps):
@@ -329,7 +333,7 @@ def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
-    """Return the eigenvalues, largest first. Of a complex pair, the one with positive imaginary part first."""
+    """Return the eigenvalues by falling magnitude. In a complex pair, the positive imaginary part comes first."""
     return sort_multipliers(np.linalg.eigvals(DP).astype(np.complex128))
 
 

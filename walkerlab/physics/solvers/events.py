@@ -166,8 +166,9 @@ def divide_out_zero(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Return the slope (per step) at which an event function leaves its zero at the start, or 0 if not over
-    `clearly`.
+    """Return the slope (per step) with which an event function leaves its zero at the start.
+
+    Returns 0 if no slope is larger than `clearly`.
     """
     # The error of the last event's time leaves a small value at the start, which is subtracted.
     size = set_root_piece(finder, event, False)

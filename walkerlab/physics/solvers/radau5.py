@@ -2,10 +2,10 @@
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8.
 
-Its linear systems, (s I - J) x = r, are reduced to half their size for equations of motion. With q' = v the
+The linear systems, (s I - J) x = r, are reduced to half their size for equations of motion. With q' = v the
 upper half of the Jacobian is (0 I). Eliminating the positions leaves (s I - J_v - J_q / s) x_v = r_v + J_q r_q / s and
 x_q = (r_q + x_v) / s. The factors take an eighth of the work. If the velocities were eliminated instead,
-x_v = s x_q - r_q would cancel digits where damping is stiff. The source calls it special structure.
+x_v = s x_q - r_q would lose digits by cancellation where damping is stiff. The source calls this 'special structure'.
 """
 
 import math
@@ -305,7 +305,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     while method.counts[stepping.RHS] < method.counts[stepping.BUDGET]:
         if h <= stepping.SMALLEST_STEP * max(abs(t), 1e-3):
             return stepping.STEP_TOO_SMALL
-        # stretch a step that nearly reaches the end, rather than leave a tiny one
+        # Stretch a step that nearly reaches the end, because a tiny one would have to follow.
         last = t + 1.0001 * h >= t_end
         if last:
             h = t_end - t
