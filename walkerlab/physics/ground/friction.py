@@ -174,7 +174,7 @@ FRICTION_LAWS: Final = LawKind(
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Return an upper bound on the coefficient's change over a range `slip` (m/s)."""
+    """Return an upper bound on the change of the coefficient when the slip velocity changes by `slip` (m/s)."""
     if law.largest == 0.0:
         return 0.0
     # The coefficient may fall to its sliding value more steeply than it rises.

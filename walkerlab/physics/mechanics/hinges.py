@@ -31,7 +31,7 @@ def legs_apart(system: Any, y: Any) -> tuple[float, float]:
 
 
 class HingeTorque(NamedTuple):
-    """Torque at a hinge, and its derivatives with respect to the angle between the bodies and the rate of that angle."""
+    """Torque at a hinge, and its derivatives with respect to the angle between the bodies and to the angle's rate."""
 
     resistance: float  # N m, turns the first body back and the second forward; the opposite of `SpringDamper.torque`
     elastic: float  # N m, the part that stores energy

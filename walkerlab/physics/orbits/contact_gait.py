@@ -22,7 +22,7 @@ from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
+WARM_UP_STEPS = (4, 2, 0)  # how many steps to walk before Newton's method; tried in turn
 SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
 CONTACT_EFFORT = Effort(1e-10, max_evaluations=10, shortest=1e-3, growth=2.0, rounding=1.0)
 # factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall

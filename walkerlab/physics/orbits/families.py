@@ -334,8 +334,8 @@ class BranchFollower(BranchTracer):
     def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
         """Whether `branch` covers `other`, judged by the gait a quarter of the way along `other`."""
         # Halfway along there may be a fold, where the gaits of its two arms are hard to tell apart.
-        covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
-        return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
+        distances = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
+        return self.lies_on(branch, other.points[int(np.searchsorted(distances, 0.25 * other.reach))])
 
     def follow_doubled(self, parent: GaitBranch, previous: Iterable[GaitBranch]) -> list[GaitBranch]:
         branches: list[GaitBranch] = []

@@ -83,15 +83,16 @@ class BifurcationCurve:
     period: int
     first: Floats  # (points,) values of the first parameter
     second: Floats  # (points,) values of the second parameter
-    ends: tuple[BranchEnd, BranchEnd]  # where and why the curve ends; `value` is the second parameter's
+    ends: tuple[BranchEnd, BranchEnd]  # where and why the curve ends; `value` is a value of the second parameter
 
 
 def follow_curve(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """Follow the curve through a bifurcation within both spans, up to `points` points each way. Return None
-    if that fails.
+    """Follow the curve through a bifurcation both ways, within both spans and up to `points` points each way.
+
+    Returns None if no point of the curve is found.
     """
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
@@ -148,8 +149,8 @@ def clip_to_plane(inside: Floats, outside: Floats, spans: tuple[ValueSpan, Value
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    first: Floats  # (n,) centres of the cells
-    second: Floats  # (m,) centres of the cells
+    first: Floats  # (n,) values of the first parameter at the centres of the cells
+    second: Floats  # (m,) values of the second parameter there
     period: Integers  # (n, m) steps after which the attractor repeats; 0 if never, ALL_FAILED if every walk fails
 
 
@@ -209,7 +210,11 @@ def correct_row(step_map: StepMap, values: Floats, before: Points) -> Row:
 
 
 def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
-    """Return the periods of a row's attractors and a point on each. `before` holds the points of the previous row."""
+    """Return the periods of the attractors in a row of cells, and a point on each.
+
+    gaits   period-1 gait of each cell
+    before  points on the attractors of the previous row
+    """
     periods = np.full(len(values), ALL_FAILED, np.int64)
     points = list[Floats | None]()
     for index, gait in enumerate(gaits):
@@ -217,7 +222,8 @@ def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) ->
             periods[index] = 1
             points.append(gait.z)
             continue
-        # start on the attractors of neighbouring cells, then near the cell's unstable gait, in its direction of growth
+        # Start on the attractors of neighbouring cells, then near the cell's unstable gait, displaced in the direction
+        # in which disturbances grow.
         off_gait = None if gait is None else gait.z + UNSTABLE_OFFSET * eigenvector(gait.DP, gait.multipliers[0])
         point = None
         starts = (points[index - 1] if index else None, before[index], off_gait)
