@@ -31,14 +31,13 @@ from walkerlab.config.analyses import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.evidence.benchmarks.accuracy import START_RATE_FACTOR
+from walkerlab.evidence.benchmarks.references import Reference, reference_for
 from walkerlab.evidence.benchmarks.trials import (
     USER_SCRIPT,
     ContactTrial,
-    Reference,
     RigidTrial,
     Trial,
     contact_trial,
-    reference_for,
     walk_as_a_script,
 )
 from walkerlab.evidence.paper.walker import compass, compass_or_none
@@ -63,10 +62,9 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
 from walkerlab.pipeline.store.runs import RunFolder
-from walkerlab.scene.contact import contact_scene, start_state
+from walkerlab.scene.contact import MAP_RTOL, contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.scaled import MAP_RTOL
 
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10

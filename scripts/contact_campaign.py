@@ -1,4 +1,4 @@
-"""Random walks on compliant ground against a plain integration written for the tests: nothing differs but by errors.
+"""Compare random walks on compliant ground with a plain integration, written for the tests, up to numerical errors.
 
     python scripts/contact_campaign.py                 # 200 walks, seeds 0 to 199
     python scripts/contact_campaign.py --walks 6 --seed 3
@@ -50,7 +50,7 @@ import plain_walk
 from walkerlab.config.drives import push_offs
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import Kneed, second_leg_of
+from walkerlab.config.walkers import Kneed
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.contact_loop import EVENT_TIME
 from walkerlab.physics.hybrid.contact_result import RESIDUAL_FACTOR, ContactWalkResult
@@ -312,12 +312,12 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
     assert contact is not None, "drawn with one"
     si = contact.to_si()
     smooth = contact.friction == "none"
-    legs = plain_walk.replace_second_leg(plain_legs(walker), plain_legs(second_leg_of(walker)))
+    legs = plain_walk.replace_second_leg(plain_legs(walker), plain_legs(walker.second))
     return plain_walk.Plain(
         *legs, walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
         si.exponent, si.damping, si.full_damping_penetration, 0.0 if smooth else si.static_friction,
         0.0 if smooth else si.dynamic_friction, si.stiction_velocity, si.friction_velocity,
-        TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
+        TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(walker.hip.parameters),
         np.array(push_offs(config.push_off)), config.push_off.duration_s, np.array(heights_m),
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Load fuzzed configs and damaged results: no traceback, no hang, and no NaN in a stored result.
+"""Load fuzzed configs and damaged results, and check for tracebacks, hangs and NaNs in stored results.
 
     python scripts/fuzz_campaign.py                          # 2,000 configs, 200 damaged results
     python scripts/fuzz_campaign.py --configs 50 --damaged 20

@@ -70,7 +70,7 @@ class Scene:
 
 
 def with_books(kept: bool) -> None:
-    """Simulate the paper's walk, with or without the energy balance: losses to damping, friction and edges."""
+    """Simulate the paper's walk, with or without the energy balance (losses to damping, friction and edges)."""
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, BUDGET)

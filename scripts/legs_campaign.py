@@ -1,4 +1,4 @@
-"""Gaits of random walkers whose legs differ, against a plain integration of both swings written for the tests.
+"""Compare gaits of random walkers whose legs differ with a plain integration of both swings, written for the tests.
 
     python scripts/legs_campaign.py              # 100 walkers
     python scripts/legs_campaign.py 12 --seed 7

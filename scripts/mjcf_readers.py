@@ -138,11 +138,48 @@ def read_in_pybullet(path, _step_s):
     yield "keyframe", "dropped"
 
 
+def read_in_pinocchio(path, _step_s):
+    import pinocchio
+
+    feet, model = Feet(path), pinocchio.buildModelFromMJCF(path)
+    geometry = pinocchio.buildGeomFromMJCF(model, path, pinocchio.GeometryType.COLLISION)
+    yield "gravity", model.gravity.linear
+    yield "total mass", pinocchio.computeTotalMass(model)
+    yield (
+        "keyframe",
+        "positions read" if np.allclose(model.referenceConfigurations["gait"], feet.key.qpos) else "dropped",
+    )
+    yield "pairs of shapes that can touch", len(geometry.collisionPairs)
+    model.gravity.linear = feet.model.opt.gravity
+    free = pinocchio.aba(model, model.createData(), feet.key.qpos, feet.key.qvel, np.zeros(model.nv))
+    feet.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    feet.data.qpos[:] = feet.key.qpos
+    feet.data.qvel[:] = feet.key.qvel
+    mujoco.mj_forward(feet.model, feet.data)
+    yield "largest difference from MuJoCo's accelerations without contact", np.abs(free - feet.data.qacc).max()
+
+
+def read_in_dart(path, _step_s):
+    import dartpy
+
+    world = dartpy.utils.MjcfParser.readWorld(path)
+    (walker,) = (
+        skeleton for skeleton in map(world.getSkeleton, range(world.getNumSkeletons())) if skeleton.getNumDofs()
+    )
+    links = [link for link in map(walker.getBodyNode, range(walker.getNumBodyNodes())) if link.getMass() > 0.0]
+    yield "gravity", world.getGravity()
+    yield "total mass", walker.getMass()
+    yield "moments of inertia", [round(link.getInertia().getMoment()[1, 1], 4) for link in links]
+    yield "keyframe", "read" if walker.getPositions().any() else "dropped"
+
+
 READERS = {
     "mujoco": read_in_mujoco,
     "drake": read_in_drake,
     "newton": read_in_newton,
     "pybullet": read_in_pybullet,
+    "pin": read_in_pinocchio,
+    "dartpy": read_in_dart,
 }
 
 

@@ -46,7 +46,7 @@ and adds a term that should not be there:
 ```
 
 Here I is the leg's moment of inertia about its centre of mass. With this mistake we get all digits of the
-script. A later script by the same author has the right heel strike
+script. A later script of the same family has the right heel strike
 ([passivewalker-sim](published-right.md#passivewalker-sim)). To see it for yourself, type this (other names from the
 tables work as well):
 
@@ -62,6 +62,9 @@ Below are the gaits that differ, one by one. Those that are right have [a page o
 [known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [check a gait](check.md).
 
 ## Gaits that differ
+
+Each gait has its source: author, *title* and year, as far as they are known. The author of a program is the one that
+its file names, or else the GitHub account that publishes it.
 
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
 one that shares no equations with it. For all {all} gaits they agree: after a step of the plain model from the gait of
@@ -162,7 +165,7 @@ def entry_of(file: Path) -> Entry:
     in_the_table = ("The right gait", "Two independent")
     return Entry(
         name=file.stem,
-        source=", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"],
+        source=short_source(source),
         finding=finding_of(summary),
         reproduced=f"{len(reproduced)} of {len(rows)}{note}",
         routes=difference_of_routes(summary),
@@ -175,6 +178,13 @@ def entry_of(file: Path) -> Entry:
             source_of(source),
         ),
     )
+
+
+def short_source(source: Mapping) -> str:
+    """Return author, title and year of a source, as far as they are known."""
+    title = f"*{source['title']}*"
+    dated = f"{title} ({source['year']})" if source["year"] else title
+    return f"{source['authors']}, {dated}" if source["authors"] else dated
 
 
 def difference_of_routes(summary: Mapping) -> float:

@@ -1,15 +1,19 @@
-"""Search the gaits of random walkers of every type, and hold each chosen gait's multipliers against ten steps walked.
+"""Search the gaits of random walkers of every type, and compare each chosen gait's multipliers with simulated steps.
 
     python scripts/walker_campaign.py                         # 200 walkers of each type, some two minutes
     python scripts/walker_campaign.py --walkers 20 --types kneed --seed 3
 
-Every search has to end in a gait or in words. Where it finds none, SciPy's `root` tries the step map from the first
-40 that walk of other starts: what it finds was overlooked. A chosen gait is walked from starts 1e-6, and half as far,
-to either side of it along every coordinate of the step map (unit leg length and gravity): as long as theory keeps
-these walks within 1e-3 of the gait they go on, and the trace of what k steps did to the starts is the sum of the
-multipliers' k-th powers. Every gait's heel strike needs the impulse that the masses' momentum, summed one by one,
-says; one that would have to pull is objected to. The first walkers of a type walk over rough ground from a start near
-their gait, some of them until a foot lands just ahead of the other: each of these walks is SciPy's, step by step.
+Four things are checked:
+
+- Every search ends in a gait or in an explanation. If it finds no gait, SciPy's `root` tries the step map from 40 other
+  starts that walk; a gait that it finds was overlooked.
+- The multipliers of a chosen gait agree with walks that start 1e-6, and half of that, to either side of it along every
+  coordinate of the step map (unit leg length and gravity). As long as these walks stay within 1e-3 of the gait by
+  theory, the trace of the derivative observed over k steps must be the sum of the k-th powers of the multipliers.
+- The heel strike of every gait needs the impulse by which the momentum, summed over the masses, changes. A gait is
+  rejected if the ground would have to pull.
+- The first walkers of a type walk over rough ground from a start near their gait, some of them until a foot lands just
+  ahead of the other. SciPy takes the same steps.
 `light-hips` are the compasses whose gaits are hardest to follow
 from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
 itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: each gait's cost of

@@ -1,4 +1,4 @@
-"""A headless Chromium, spoken to over a pipe in its own protocol: nothing to install but the browser."""
+"""Control a headless Chromium over a pipe by its own protocol, which needs nothing but the browser."""
 
 import base64
 import contextlib
@@ -29,7 +29,7 @@ PATIENCE = 240.0  # s; what a page has made is made at low priority, beside othe
 
 
 def executable():
-    """Where a Chromium is; None if there is none. `CHROMIUM` names one that is elsewhere."""
+    """Return the path of Chromium, or None if there is none. The variable `CHROMIUM` may name it."""
     named = os.environ.get("CHROMIUM")
     return named or next((found for name in NAMES if (found := shutil.which(name))), None)
 
@@ -38,7 +38,7 @@ LEFT = "Inspected target navigated"
 
 
 class PageLeftError(Exception):
-    """The page was left while it was asked."""
+    """The page was left while a script was running on it."""
 
 
 class Browser:
@@ -64,7 +64,7 @@ class Browser:
             self.call(f"{domain}.enable")
 
     def call(self, method, **parameters):
-        """Ask the browser for something, and keep what it tells meanwhile."""
+        """Send the browser a request, and keep the events that it reports meanwhile."""
         number = next(self.numbers)
         message = {"id": number, "method": method, "params": parameters}
         if self.session:
@@ -88,7 +88,7 @@ class Browser:
         return json.loads(line)
 
     def open(self, file, width=1200, height=900, *, dark=False, calm=False):
-        """Show a file, and wait until it stands."""
+        """Show a file, and wait until the page is complete."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         features = [
             {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
@@ -100,13 +100,13 @@ class Browser:
         self.until("document.readyState === 'complete'")
 
     def evaluate(self, expression):
-        """The value of an expression on the page."""
+        """Return the value of an expression on the page."""
         answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
     def until(self, expression):
-        """Wait until an expression holds."""
+        """Wait until an expression is true."""
         deadline = time.monotonic() + PATIENCE
         while not self.holds(expression):
             assert time.monotonic() < deadline, expression
@@ -120,29 +120,29 @@ class Browser:
             return False
 
     def press(self, key, code=0):
-        """Press a key and let it go."""
+        """Press a key and release it."""
         text = {"text": key} if len(key) == 1 else {}
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **text)
 
     def screenshot(self):
-        """What is seen, as PNG."""
+        """Return what the page shows, as PNG."""
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def requests(self):
-        """Every address that was asked for since the page was opened."""
+        """Return every address that was requested since the page was opened."""
         sent = [
             event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"
         ]
         return [url for url in sent if not url.startswith("data:")]
 
     def complaints(self):
-        """What scripts and the browser said on its console."""
+        """Return what scripts and the browser wrote to the console."""
         kinds = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
         return [event["params"] for event in self.events if event["method"] in kinds]
 
     def close(self):
-        """End the browser and forget its profile."""
+        """End the browser and delete its profile."""
         with contextlib.suppress(AssertionError, OSError):
             self.session = None
             self.call("Browser.close")

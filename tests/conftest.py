@@ -1,4 +1,4 @@
-"""What all tests share: property tests draw the same examples everywhere, and a slow machine is no failure.
+"""Settings of all tests: property tests draw the same examples everywhere, and may take long on slow machines.
 
 Files that compile or compute longest come first: no worker is left alone with one of them while the others are done.
 One worker more than there are processors computes while others wait for programs, browsers and servers.
@@ -29,7 +29,7 @@ LONGEST_FIRST = (  # one of the first three compiles the package's kernels, one 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_xdist_auto_num_workers():
-    """How many workers there are, but for `--maxprocesses`."""
+    """Return the number of workers, which `--maxprocesses` may reduce."""
     return (yield) + 1
 
 

@@ -1,4 +1,4 @@
-"""`walkerlab explore` as a process, and how it is asked."""
+"""Run `walkerlab explore` as a process, and send requests to it."""
 
 import contextlib
 import http.client
@@ -25,7 +25,7 @@ class Served:
         self.bearer = {"Authorization": f"Bearer {self.token}"}
 
     def asked(self, path, body=None, **headers):
-        """Status and answer; the token is given unless other headers are."""
+        """Return status and answer of a request. It carries the token unless other headers are given."""
         text = body if body is None or isinstance(body, str) else json.dumps(body)
         # Closed whatever happens: an error keeps the socket alive, and warns when it is freed, in any later test.
         with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)) as connection:

@@ -1,4 +1,4 @@
-"""Programs in processes forked off one that has the libraries loaded: as apart as any, without a second of imports.
+"""Run programs in forks of a process that has loaded the libraries. They are separate, and save a second of imports.
 
 Run as a script it is that one: it forks for every line of JSON that it reads, and answers with the exit code.
 """
@@ -38,7 +38,7 @@ class Forks:
         atexit.register(self.process.communicate)
 
     def run(self, module, arguments, folder, environment):
-        """`python -m module arguments` in a folder, to its end."""
+        """Run `python -m module arguments` in a folder and wait for its end."""
         with tempfile.TemporaryDirectory() as place:
             said = [Path(place, name) for name in ("stdout", "stderr")]
             asked = (module, [str(one) for one in arguments], str(folder), environment, [str(path) for path in said])
@@ -51,7 +51,7 @@ class Forks:
 
 @cache
 def forks():
-    """The one of this process."""
+    """Return the server of this process."""
     return Forks()
 
 
@@ -65,7 +65,7 @@ def loaded_with_the_package():
 
 
 def serve():
-    """Fork for each request; in the child, what it is to run, in the parent at the end None."""
+    """Fork for each request. Return what to run in the child, and None in the parent at the end."""
     for line in sys.stdin:
         if not (child := os.fork()):
             return json.loads(line)
@@ -74,7 +74,7 @@ def serve():
 
 
 def become(module, arguments, folder, environment, said):
-    """Be `python -m module` in a folder."""
+    """Run `python -m module` in a folder, in place of this process."""
     signal.alarm(LONGEST_S)
     for number, path in enumerate((os.devnull, *said)):
         file = os.open(path, os.O_RDWR | os.O_CREAT)
@@ -89,7 +89,7 @@ def become(module, arguments, folder, environment, said):
 
 
 def to_the_end(asked):
-    """Be what is asked for, and end without taking all libraries down first, which would take longer than most runs."""
+    """Run the request and exit without unloading the libraries, which would take longer than most runs."""
     code = 0
     try:
         become(*asked)

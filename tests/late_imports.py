@@ -1,4 +1,4 @@
-"""Modules that are imported when a test first uses them: every worker collects all tests, but runs a part of them."""
+"""Import modules when a test first uses them, because every worker collects all tests but runs only a part of them."""
 
 import importlib.util
 import sys

@@ -1,4 +1,4 @@
-"""A rigid walk over footholds of any height by a library's integrator, event by event, in Python."""
+"""Simulate a rigid walk over footholds of any height in Python, event by event, with a library's integrator."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -16,7 +16,7 @@ EXACT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13}
 
 
 def foot_of(walker, y):
-    """Ahead of and over the present contact point (m), by the levers' definition."""
+    """Return a foot's position ahead of and above the present contact point (m), from the levers' definition."""
     psi = np.array(y[: len(walker.arm_x)]) + walker.slope
     return (
         float(np.cos(psi) @ walker.foot_x - np.sin(psi) @ walker.foot_y),
@@ -25,7 +25,7 @@ def foot_of(walker, y):
 
 
 def hip_over_fall(walker, y):
-    """How much higher the hip is than where a walker counts as fallen (m)."""
+    """Return the hip's height above that at which a walker counts as fallen (m)."""
     psi = y[STANCE] + walker.slope
     height = walker.radius + np.sin(psi) * walker.hip_x + np.cos(psi) * walker.hip_y
     return height - FALLEN_HIP * walker.leg_length

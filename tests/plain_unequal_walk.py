@@ -1,4 +1,4 @@
-"""Walks of a walker with two different legs by SciPy: a plain, independent route to the rigid model's strides.
+"""Simulate a walker with two different legs with SciPy, independently of the rigid model.
 
 A leg is a list of its segments from the hip down. Angles are from the slope's normal, and walks go in the direction of
 x, downhill. The strikes follow from balances of angular momentum: of the whole walker about the new contact point and

@@ -1,4 +1,4 @@
-"""Appendix A's released matrix, energies, forces and feet, typed from the paper once for all tests."""
+"""Appendix A's released matrix, energies, forces and feet, typed from the paper for all tests."""
 
 import math
 

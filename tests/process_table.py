@@ -1,4 +1,4 @@
-"""Processes by the kernel's own table, for tests that look whether any is left."""
+"""Read the kernel's table of processes, so that tests can check that none is left."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ THERE = Path("/proc/self/stat").exists()
 
 
 def processes_below(parent):
-    """The ids of all processes below a process."""
+    """Return the ids of all descendants of a process."""
     children = {}
     for entry in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -23,12 +23,12 @@ def processes_below(parent):
 
 
 def workers_below(parent):
-    """Those that are workers of the package."""
+    """Return those descendants that are workers of the package."""
     return [pid for pid in processes_below(parent) if "walkerlab.pipeline.run.workers" in command_of(pid)]
 
 
 def command_of(pid):
-    """What a process was started as; empty for one that has ended."""
+    """Return the command that started a process, or an empty string if it has ended."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_text()
     except OSError:

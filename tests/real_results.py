@@ -1,4 +1,4 @@
-"""What stages store of a small run of the paper's walker: the results that other tests' results derive from."""
+"""Results that stages store of a small run of the paper's walker. Results for other tests are derived from them."""
 
 import functools
 from dataclasses import replace
@@ -28,7 +28,7 @@ MEMORY = MemoryResults()
 
 @functools.cache
 def real(stage):
-    """The result of a stage on a walk of two strides, computed once per run of the tests."""
+    """Return the result of a stage on a walk of two strides, computed once per test run."""
     config = load(None, ["strides=2", *SMALL[stage]]).config
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_parameters, "PLANE_CELLS", (3, 2))
@@ -40,7 +40,7 @@ def real(stage):
 
 
 def first_steps(stage, steps):
-    """The trajectory of a walk up to the end of one of its steps."""
+    """Return the trajectory of a walk up to the end of one of its steps."""
     result = real(stage)
     trajectory = result.groups["trajectory"]
     end = result.summary["touch_times_s"][min(max(steps, 1), result.summary["steps"]) - 1]

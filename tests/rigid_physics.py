@@ -1,4 +1,4 @@
-"""The rigid model's functions for states in tuples, in Python, where scratch that is read unwritten is no number."""
+"""The rigid model's functions in Python, for states in tuples. Scratch memory begins as NaN."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -20,7 +20,7 @@ from walkerlab.physics.solvers.system import derivative
 
 
 def rates(model, phase, y):
-    """Angular accelerations."""
+    """Return the angular accelerations."""
     f = np.zeros(len(y))
     derivative(Mode(model, phase), 0.0, np.array(y, float), f)
     return tuple(f[len(y) // 2 :])
@@ -43,7 +43,7 @@ def knee_strike(model, y, columns=()):
 
 
 def struck(phase, model, y, columns):
-    """The state after a strike, with the images of directions behind it."""
+    """Return the state after a strike, with the images of directions after it."""
     before = np.concatenate((y, *columns))
     after = np.full(before.size, np.nan)
     impact.strike(model, model, phase, before, after)
@@ -74,13 +74,13 @@ def torque_work_of_a_step(model, start, step):
 
 
 def state_linked(model, phase, y):
-    """A state with the followers where those are that they follow."""
+    """Return a state with each follower at the angle that its coupling gives."""
     n = len(y) // 2
     return (*apply_couplings(model, phase, y[:n]), *apply_couplings(model, phase, y[n:]))
 
 
 def momentum_of_masses(assembly, slope, y):
-    """Along the slope and normal to it (kg m/s), mass by mass, standing on the assembly's second foot."""
+    """Sum the masses' momentum along and normal to the slope (kg m/s), standing on the assembly's second foot."""
     members = group_bodies(assembly).members
     theta, omega = members @ np.array(y).reshape(2, -1)[0], members @ np.array(y).reshape(2, -1)[1]
     foot = assembly.feet[1]

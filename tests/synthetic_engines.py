@@ -1,4 +1,4 @@
-"""Walks in other engines as they might have come out, in the layout that `engines` stores."""
+"""Made-up results of walks in other engines, in the layout that `engines` stores."""
 
 import numpy as np
 

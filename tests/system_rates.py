@@ -1,4 +1,4 @@
-"""The equations of a system as functions of its state that give what they write."""
+"""Functions of the state that return what a system's equations write."""
 
 import numpy as np
 

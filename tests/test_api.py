@@ -1,4 +1,4 @@
-"""The package from Python."""
+"""Tests of the Python interface."""
 
 import ast
 import copy
@@ -74,7 +74,7 @@ def test_importing_the_package_loads_nothing():
 
 
 def test_stages_do_not_depend_on_the_python_interface():
-    """Else every result would be out of date once a docstring of it is edited."""
+    """Otherwise every result would be out of date after an edit of a docstring in the interface."""
     names = {module.name for module in Sources().closure("walkerlab.pipeline.stages.fixedpoint")}
     assert "walkerlab" in names
     assert "walkerlab.api" not in names
@@ -200,7 +200,7 @@ print([round(float(period), 4) for period in gaits.period_s])
 
 
 def run_unguarded(tmp_path, engine, jobs, from_standard_input):
-    """What became of a script that sweeps without a guard."""
+    """Return the outcome of a script that sweeps without a main guard."""
     path = tmp_path / "unguarded.py"
     path.write_text(UNGUARDED)
     return subprocess.run(

@@ -1,4 +1,4 @@
-"""Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
+"""Check the architecture: imports go down through the layers, kernels import only kernels, configs have one source."""
 
 import ast
 import functools
@@ -105,7 +105,7 @@ def test_docs_list_the_same_layers():
 
 
 def exceptions(found, paths=IN_LAYERS):
-    """What `found` finds in each file, without files in which it finds nothing."""
+    """Return what `found` finds in each file, without files in which it finds nothing."""
     return {named(path): names for path in paths if (names := found(path))}
 
 

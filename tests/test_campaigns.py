@@ -1,4 +1,4 @@
-"""The campaigns of scripts/, cut short: kills, runs at once, fuzzed configs, damage, random walkers, speed claims."""
+"""Run the campaigns of scripts/ briefly: kills, parallel runs, fuzzed configs, damage, random walkers, speed."""
 
 import importlib.util
 import sys

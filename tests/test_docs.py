@@ -1,4 +1,4 @@
-"""README and docs say what is so: links lead somewhere, commands are accepted, tables are what the tool gives."""
+"""Check README and docs: links lead somewhere, commands are accepted, and tables and outputs are those of the tool."""
 
 import base64
 import json
@@ -23,11 +23,11 @@ import walkerlab
 from walkerlab.config import reads
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
-from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.ground.friction import FRICTION_LAWS, friction_coefficient
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.contact import LAW_KINDS, missing_members
+from walkerlab.scene.laws import missing_members
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration
 
@@ -53,7 +53,7 @@ def text_of(path):
 
 
 def code_in(path):
-    """What stands in backticks or in a fenced block."""
+    """Yield what stands in backticks or in a fenced block."""
     text = text_of(path)
     yield from re.findall(r"^ *```[a-z]*\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE)
     yield from re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text)
@@ -61,7 +61,7 @@ def code_in(path):
 
 @cache
 def commands():
-    """Those of stages that are not run as examples."""
+    """Return the commands of stages that are not run as examples."""
     names = {stage.name for stage in PIPELINE.stages if not stage.adds_command} | {*ANSWER_AT_ONCE, "clean", "sweep"}
     code = [code for path in DOCUMENTS for code in code_in(path) if not code.startswith("$ ")]
     found = {command.strip() for each in code for command in COMMAND.findall(each)}
@@ -123,7 +123,7 @@ def test_example_stage_of_the_docs_runs(monkeypatch):
 def test_example_friction_law_of_the_docs_is_complete_and_its_derivative_correct(monkeypatch):
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
     example = runpy.run_path(str(ROOT / "docs" / "examples" / "extension" / "tanh_friction" / "law.py"))["Tanh"]
-    assert missing_members(example, LAW_KINDS["friction"]) == []
+    assert missing_members(example, FRICTION_LAWS) == []
     law, h = example.from_contact(Contact(units="si")), 1e-6
     assert law == pytest.approx((0.7, 0.1, 0.3, 0.3))
     low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))
@@ -149,14 +149,14 @@ def test_files_and_names_in_the_developer_pages_exist(page):
 
 
 def places():
-    """Where a file may be that a document names."""
+    """Return the folders in which a file that a document names may be."""
     package = ROOT / "walkerlab"
     return (ROOT, package, *(path for path in package.iterdir() if path.is_dir()))
 
 
 @cache
 def named_runs():
-    """The runs that commands of the documents name."""
+    """Return the runs that commands of the documents name."""
     return {name for command in commands() for name in re.findall(r"--name (\S+)", command)}
 
 
@@ -209,7 +209,7 @@ def test_documented_config_is_accepted(text, tmp_path):
 
 
 def run(command, exit_code_before):
-    """As in a shell; a command of the package alone runs in a process that has the libraries loaded."""
+    """Run a command as in a shell. A command of the package alone runs in a process that has the libraries loaded."""
     name, *words = shlex.split(command)
     if name != "walkerlab" or {"|", ";", "&&", ">", "<"} & {*words}:
         return MAKER["run_in_shell"](command, exit_code_before)
@@ -285,7 +285,7 @@ def test_page_for_newcomers_has_a_picture(page):
     assert re.search(r"^!\[[^]]+\]\(images/", text_of(ROOT / "docs" / f"{page}.md"), re.MULTILINE)
 
 
-def test_pictures_contain_the_labels_drawn_today(tmp_path):
+def test_pictures_in_the_docs_have_the_labels_that_the_code_draws(tmp_path):
     assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
 
 
@@ -299,7 +299,7 @@ def test_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     assert list(MAKER["stale_pictures"](tmp_path / "runs")) == [tmp_path / "images" / "figure-06.png"]
 
 
-def test_words_of_a_picture_contain_no_numbers():
+def test_stored_labels_of_a_picture_contain_no_numbers():
     words_of = MAKER["stale_pictures"].__globals__["words_of"]
     svg = "<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>"
     assert words_of(svg) == "slope (rad)\nstep #\n"

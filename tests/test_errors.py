@@ -1,4 +1,4 @@
-"""Every failure a user can act on carries its message, its advice and its exit code."""
+"""Check that every failure on which a user can act has its message, its advice and its exit code."""
 
 import pickle
 

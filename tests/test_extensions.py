@@ -1,4 +1,4 @@
-"""Extensions of other packages: the example of the docs and faulty ones, installed as pip leaves them on the path."""
+"""Tests of extensions by other packages: the example of the docs, and faulty ones, installed as pip does."""
 
 import json
 import os
@@ -82,7 +82,7 @@ WALK = (
 
 @pytest.fixture(scope="module")
 def walked(example):
-    """The example with a walk on its friction."""
+    """Return a walk of the example on its friction law."""
     done = example("contact-sim", *WALK, "--jobs", "1", "--json")
     assert done.returncode == 0, done.stderr
     return example, json.loads(done.stdout)
@@ -201,6 +201,90 @@ def test_energy_balances_with_the_normal_force_of_an_extension(site):
     done = site("export", "paper", "model", "--to", "adm", "--set", "contact.normal_force=hunt-crossley")
     assert done.returncode == 3
     assert "The normal-force law HuntCrossley cannot be exported." in done.stderr
+
+
+HINGES = """
+from walkerlab.physics.mechanics.hinges import HingeTorque, SpringDamper, hinge_energy, hinge_torque
+
+class Linear(SpringDamper):
+    pass
+
+@hinge_torque.case(Linear)
+def linear(law, angle, rate):
+    elastic = law.stiffness * angle
+    return HingeTorque(elastic + law.damping * rate - law.torque, elastic, law.stiffness, law.damping)
+
+@hinge_energy.case(Linear)
+def linear_energy(law, angle):
+    return 0.5 * law.stiffness * angle * angle
+
+class Cubic(SpringDamper):
+    pass
+
+@hinge_torque.case(Cubic)
+def cubic(law, angle, rate):
+    elastic = law.stiffness * angle**3
+    resistance = elastic + law.damping * rate - law.torque
+    return HingeTorque(resistance, elastic, 3.0 * law.stiffness * angle**2, law.damping)
+
+@hinge_energy.case(Cubic)
+def cubic_energy(law, angle):
+    return 0.25 * law.stiffness * angle**4
+
+class Halfway(SpringDamper):
+    pass
+
+@hinge_torque.case(Halfway)
+def halfway(law, angle, rate):
+    return cubic(law, angle, rate)
+"""
+
+
+@pytest.fixture(scope="module")
+def hinges(tmp_path_factory):
+    """Packages with hinge laws: a copy of the built-in one, a cubic spring, and one without an energy."""
+    site = Site(tmp_path_factory.mktemp("hinges"))
+    laws = {"copy": "hinge_laws:Linear", "cubic": "hinge_laws:Cubic", "halfway": "hinge_laws:Halfway"}
+    declaration = f"from walkerlab.extensions import Extension\nEXTENSION = Extension(1, hinge_law={laws})\n"
+    add(site.packages, "hinges", declaration)
+    (site.packages / "hinge_laws.py").write_text(HINGES)
+    return site
+
+
+def sprung_walk(site, command, law):
+    parameters = "spring_N_m_per_rad: 30, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.5"
+    methods = [f"solver.{model}.method=scipy-lsoda" for model in ("rigid", "contact")]
+    settings = [f"walker.hip={{{parameters}, hinge_law: {law}}}", *methods]
+    words = [word for setting in settings for word in ("--set", setting)]
+    done = site(command, "-c", "slope-3deg", "--strides", "1", *words, "--jobs", "1", "--json", "--name", law)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("command", ["simulate", "contact-sim"])
+def test_copy_of_the_built_in_hinge_law_gives_the_same_walk_to_the_last_digit(hinges, command):
+    built_in, copied = (sprung_walk(hinges, command, law) for law in ("linear", "copy"))
+    same = {key for key, value in built_in.items() if copied[key] == value}
+    assert {"step_period_s", "step_length_m", "outcome", "energy_balance_residual_J"} <= same
+    assert copied["step_period_s"] > 0.0
+
+
+def test_energy_balances_with_the_cubic_hip_spring_of_an_extension(hinges):
+    cubic = sprung_walk(hinges, "contact-sim", "cubic")
+    assert abs(cubic["energy_balance_residual_J"]) < 1e-4 * cubic["dissipated_J"]["damping"]
+    assert cubic["step_period_s"] != sprung_walk(hinges, "contact-sim", "linear")["step_period_s"]
+
+
+def test_incomplete_hinge_law_is_refused_before_the_walk(hinges):
+    done = hinges("simulate", "--set", "walker.hip.hinge_law=halfway", "--name", "halfway")
+    assert done.returncode == 3
+    assert "the hinge law Halfway ('halfway') is incomplete: it lacks a case @hinge_energy.case(Halfway)" in done.stderr
+
+
+def test_other_programs_refuse_the_hinge_law_of_an_extension(hinges):
+    done = hinges("export", "paper", "model", "--to", "mjcf", "--set", "walker.hip.hinge_law=cubic")
+    assert done.returncode == 3
+    assert "The hinge law cubic cannot be exported." in done.stderr
 
 
 RODS = """

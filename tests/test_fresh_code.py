@@ -1,4 +1,4 @@
-"""An edited function never runs stale: compiled code belongs to the sources that it was made of."""
+"""Check that an edited function never runs outdated code, because compiled code is stored with its sources' digest."""
 
 import json
 import os
@@ -203,7 +203,7 @@ DIGEST = "from walkerlab.physics.kernel_cache import sources_digest; print(sourc
 
 @pytest.fixture(scope="module")
 def digest_after_an_edit(unchanged, tmp_path_factory):
-    """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
+    """Return the digest of the kernels' sources before and after a comment is added to a file of a copy."""
     folder = tmp_path_factory.mktemp("edited")
     shutil.copytree(unchanged, folder / "walkerlab")
     command = [sys.executable, "-B", "-c", DIGEST]
@@ -231,7 +231,7 @@ def digest_after_an_edit(unchanged, tmp_path_factory):
     [
         "__init__.py",
         "errors.py",
-        "evidence/paper/errata.py",
+        "evidence/paper/rows.py",
         "physics/orbits/small_slope.py",
         "physics/mechanics/parts.py",
     ],

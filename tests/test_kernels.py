@@ -1,4 +1,4 @@
-"""What compiled functions may do, and what they may not."""
+"""Tests of what compiled functions can do and what they must not do."""
 
 import importlib
 import os
@@ -134,7 +134,7 @@ class Box(NamedTuple):
 
 @kernel_part
 def filled(box, share):
-    """What is in the box, which is written down in it."""
+    """Add to the box and return its contents."""
     box.sides[0] += share
     return box.depth * box.sides[0] * box.sides[1] + (box.lid.weights[-1] if box.lid.open else 0.0)
 

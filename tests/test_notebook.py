@@ -1,4 +1,4 @@
-"""The notebook of the tutorial runs from its first cell to its last, and says what its text says of it."""
+"""Check that the notebook of the tutorial runs from its first cell to its last and gives what its text says."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ NOTEBOOK = Path(__file__).parent.parent / "docs" / "notebook.ipynb"
 
 @pytest.fixture(scope="module")
 def names():
-    """What its cells leave behind."""
+    """Run the notebook and return the names that its cells define."""
     matplotlib.use("Agg")
     names = {}
     for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]:

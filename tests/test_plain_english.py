@@ -1,4 +1,4 @@
-"""What a machine can check of plain English: names, how docstrings begin, and references that lead somewhere.
+"""Check plain English as far as a machine can: names, beginnings of docstrings, and references.
 
 The rules are in CONTRIBUTING.md.
 """

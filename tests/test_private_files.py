@@ -1,4 +1,4 @@
-"""Compiled code and pickles are run when they are loaded, so nobody else may have written them."""
+"""Check that compiled code and pickles, which run when loaded, are loaded only if no other user can write them."""
 
 import contextlib
 import os
@@ -44,13 +44,13 @@ class Planted:
 
 
 def as_user(user):
-    """Arguments that start a process of another user; none for this one."""
+    """Return arguments that start a process as another user, or none for this user."""
     return {} if user == os.geteuid() else {"user": user, "group": user, "extra_groups": []}
 
 
 @pytest.fixture(scope="module")
 def ordinary():
-    """An ordinary user: for root nobody if that user can read this Python, otherwise the user of this process."""
+    """Return an ordinary user: this process's or, for root, nobody if that user can read this Python."""
     if os.geteuid() == 0:
         program = [sys.executable, "-B", "-c", "import numba, walkerlab.physics.kernels"]
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""README's promises: its commands are those that are checked from empty environments."""
+"""Check that README's commands are those that CI checks in empty environments."""
 
 import re
 import tomllib

@@ -52,7 +52,7 @@ IMPORTS = [
 
 
 @pytest.mark.parametrize("statement", IMPORTS)
-def test_digest_follows_every_form_of_import(package, statement):
+def test_code_digest_follows_every_form_of_import(package, statement):
     name = package(other="", law="FORCE = 1\n")
     package(start=statement.format(package=name) + "\n")
     before = Sources().code_digest(f"{name}.start")
@@ -93,7 +93,7 @@ def test_digest_covers_data_files_next_to_the_code(package):
     assert Sources().code_digest(f"{name}.start") == other
 
 
-def test_closure_of_an_external_stage_includes_this_package(package):
+def test_code_digest_of_an_external_stage_includes_this_package(package):
     name = package(start="from walkerlab.errors import NoAnswer")
     assert "walkerlab.errors" in {module.name for module in Sources().closure(f"{name}.start")}
 
@@ -136,7 +136,7 @@ for name in starts:
 
 @pytest.fixture(scope="module")
 def imported():
-    """What importing each of the starts loads, in a process of its own that has none but other people's libraries."""
+    """Return the modules that importing each start loads, in a process that has only third-party libraries."""
     asked = f"{' '.join(LIBRARIES)}\n{' '.join(STARTS)}\n"
     # a library's threads do not come along
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
@@ -149,7 +149,7 @@ def imported():
 
 
 @pytest.mark.parametrize("name", STARTS)
-def test_closure_contains_every_module_that_python_imports(name, imported):
+def test_code_digest_covers_every_module_that_python_imports(name, imported):
     """The scanner reads text; the interpreter is the independent witness."""
     assert name in imported[name]
     drawn = {code for extension in extensions().values() for code in extension.drawing_code()}

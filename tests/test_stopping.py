@@ -1,4 +1,4 @@
-"""A request to end ends the process in order, also where it comes while LLVM calls back."""
+"""Check that a request to stop ends the process in order, even while LLVM runs a callback."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The whole process of a warm `walkerlab simulate`, against one that does no more than it must: what each loads."""
+"""Compare what the whole process of a warm `walkerlab simulate` loads with the minimum."""
 
 import runpy
 import subprocess
@@ -12,7 +12,7 @@ LOADED = "\nimport sys\nprint(*(name for name in {heavy!r} if name in sys.module
 
 
 def loaded_by(code, *arguments):
-    """Which of the heavy packages a process has loaded at its end."""
+    """Return the heavy packages that a process has loaded at its end."""
     told = code + LOADED.format(heavy=HEAVY)
     done = subprocess.run([sys.executable, "-c", told, *arguments], capture_output=True, text=True, check=True)
     return done.stderr.splitlines()[-1].split()

@@ -1,4 +1,4 @@
-"""Workers: what they are given comes back, what happens to them is told, and none is left."""
+"""Tests of workers: they return what they get, failures are reported, and no worker is left."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ DEADLINE_S = 60.0
 
 
 def until(condition):
-    """Wait for something that is bound to come."""
+    """Wait for something that will happen."""
     deadline = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < deadline

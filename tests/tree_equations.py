@@ -1,4 +1,4 @@
-"""The equations of motion of a tree with all its coordinates, as matrices to look at and to check by.
+"""The equations of motion of a tree with all its coordinates, as matrices for checks.
 
 What is integrated has the root's motion solved for; this routine has not, and runs in plain NumPy.
 """

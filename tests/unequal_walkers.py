@@ -13,7 +13,7 @@ KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
 
 
 def varied(draw, leg, share):
-    """The leg with each number changed by up to a share of it."""
+    """Return the leg with each parameter changed by up to a share of it."""
 
     def near(value):
         return value * draw.uniform(1.0 - share, 1.0 + share)
@@ -50,7 +50,7 @@ def assembly(leg, hip_mass):
 
 
 def model_of(plain):
-    """The rigid model, with a damper at each knee and a push-off of each leg."""
+    """Return the rigid model, with a damper at each knee and a push-off of each leg."""
     first, second = (assembly(leg, plain.hip_mass) for leg in plain.legs)
     model = rigid_on_slope(replace_second_leg(first, second), plain.gravity, plain.slope)
     if not any(plain.knee_damping + plain.push_offs):
@@ -62,6 +62,6 @@ def model_of(plain):
 
 
 def legs_of(state):
-    """Angles and rates of both legs."""
+    """Return angles and rates of both legs."""
     n = len(state) // 2
     return np.array([*state[:2], *state[n : n + 2]])

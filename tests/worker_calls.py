@@ -1,4 +1,4 @@
-"""Calls that workers are given in tests."""
+"""Functions that tests let workers call."""
 
 import atexit
 import os

@@ -32,6 +32,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "walkers": ("compass", "straight-legs", "kneed", "parts"),
     "normal_force": ("impact",),
     "friction": ("coulomb", "none"),
+    "hinge_law": ("linear",),
 }
 """Built-in values of the config keys to which extensions can add values, by the last part of the key. Values of
 `walkers` are those of `walker.type`.
@@ -64,6 +65,7 @@ class Extension:
     walkers: Mapping[str, str] = field(default_factory=dict)  # types of walkers, by word
     normal_force: Mapping[str, str] = field(default_factory=dict)  # classes of normal-force laws, by word
     friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by word
+    hinge_law: Mapping[str, str] = field(default_factory=dict)  # classes of hinge laws, by word
     studies: Sequence[Study] = ()
 
     def words(self, key: str) -> Mapping[str, str]:

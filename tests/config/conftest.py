@@ -1,4 +1,4 @@
-"""Fixtures of the config tests: a place to write a config to, and the message it is refused with."""
+"""Fixtures of the config tests: a folder for configs, and the message with which a config is rejected."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ def loaded(write: Write) -> Callable[..., LoadedConfig]:
 
 @pytest.fixture
 def refused(write: Write) -> Refused:
-    """Load a text and give the message it is refused with, the file's path shortened to its name."""
+    """Load a text and return the message with which it is rejected. The path of the file is shortened to its name."""
 
     def refuse(text: str = "name: mine\n", sets: Sequence[str] = ()) -> str:
         path = write(text)

@@ -41,12 +41,12 @@ def test_built_in_config_runs_under_its_own_name(name: str) -> None:
     assert (loaded.run_name, loaded.warnings) == (name, ())
 
 
-def test_as_printed_differs_from_the_paper_by_the_equations_only() -> None:
+def test_config_as_printed_differs_from_paper_only_in_its_equations() -> None:
     printed, paper = load(Path("paper-as-printed")).config, load().config
     assert printed == paper.model_copy(update={"name": "paper-as-printed", "equations": "as-printed"})
 
 
-def test_wrong_units_config_reads_the_papers_values_in_si() -> None:
+def test_config_wrong_units_reads_the_values_of_the_paper_as_si() -> None:
     contact = load(Path("contact-si")).config.contact
     assert contact is not None
     law = contact.to_si()

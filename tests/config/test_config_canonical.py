@@ -1,4 +1,4 @@
-"""What a stage is given of a config, and what its key is made of."""
+"""Tests of the part of a config that each stage gets, and of the key made from it."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class ToleranceConfig(Protocol):
 
 
 class ToleranceThenStart(StartConfig, ToleranceConfig, Protocol):
-    """Keys of bases come in the order opposite to theirs."""
+    """A type whose bases are listed in the opposite order of their keys."""
 
 
 class StartThenTolerance(ToleranceConfig, StartConfig, Protocol):
-    """The same keys."""
+    """The same keys as `ToleranceThenStart`."""
 
 
 class MisspeltConfig(Protocol):
@@ -63,7 +63,7 @@ class MisspeltConfig(Protocol):
 
 @pytest.fixture
 def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """As if `reads` imported the blocks of the config when it runs, and not for mypy alone."""
+    """Let `reads` import the blocks of the config at run time, and not for mypy alone."""
     blocks = (Basin, Case, Contact, Continuation, Design, Footholds, Identify, PushOff, Robustness)
     for block in blocks:
         monkeypatch.setattr(reads, block.__name__, block, raising=False)
@@ -81,7 +81,7 @@ def test_config_slice_of_a_stage_does_not_depend_on_imported_modules(stage: Stag
     assert stage.reads(CONFIG) == KEYS[stage.name]
 
 
-def test_type_has_the_keys_of_its_bases() -> None:
+def test_config_type_has_the_keys_of_its_base_types() -> None:
     keys = ("walker", "gravity_m_s2", "slope_rad", "push_off", "equations", "contact", "start")
     assert tuple(dotted_keys(SceneConfig)) == keys
     assert tuple(slice_of(CONFIG, SceneConfig)) == keys

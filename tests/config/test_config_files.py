@@ -1,4 +1,4 @@
-"""Whatever a file is or holds, it is a config or it is refused in words."""
+"""Check that any file is either read as a config or rejected with a message."""
 
 import os
 import tracemalloc
@@ -93,7 +93,7 @@ def test_position_of_an_invalid_utf8_byte_is_counted_in_characters(tmp_path: Pat
         load(path)
 
 
-def test_huge_file_is_rejected_unread(tmp_path: Path) -> None:
+def test_huge_file_is_rejected_without_reading_it(tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     with path.open("wb") as file:
         file.truncate(1 << 40)

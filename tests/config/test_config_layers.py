@@ -1,4 +1,4 @@
-"""A file over what it extends, and `--set` and `--strides` over both."""
+"""Tests of precedence: a file over the config that it extends, and `--set` and `--strides` over both."""
 
 import math
 import re
@@ -147,8 +147,8 @@ def test_bad_setting_is_rejected_with_its_position(refused: Refused, setting: st
     assert re.search(expected, refused("contact: {units: si}\n", sets=[setting]))
 
 
-def test_settings_do_not_modify_the_original_config() -> None:
-    """Also those within a block that an earlier setting brought."""
+def test_settings_leave_the_original_config_unchanged() -> None:
+    """This includes settings within a block that an earlier setting added."""
     tree = load(None).tree
     damping, stiffness = (parse_setting(f"contact.{text}") for text in ("damping=7", "stiffness=8"))
     block = parse_setting("contact={damping: 3, stiffness: 4}")

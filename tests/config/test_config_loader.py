@@ -1,4 +1,4 @@
-"""From a file, `extends`, `--set` and `--strides` to one config, or to a refusal that says where and why."""
+"""Tests of loading: file, `extends`, `--set` and `--strides` give a config, or an error that says where and why."""
 
 import math
 import re
@@ -64,7 +64,7 @@ print(*sorted(loaded - set(sys.stdlib_module_names)))
 
 
 def packages_loaded_by(statements: str) -> set[str]:
-    """The packages beyond the standard library that statements import, in a process of their own."""
+    """Return the packages beyond the standard library that some statements import in a process of their own."""
     command = [sys.executable, "-c", PACKAGES_LOADED.format(statements)]
     return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split())
 
@@ -117,7 +117,7 @@ def test_mid_step_start_survives_a_round_trip_unchanged(loaded: Loaded) -> None:
         ("[-0.2, null, -0.6, -0.8]", "null is not a number"),
     ],
 )
-def test_start_of_another_form_is_rejected(refused: Refused, start: str, said: str) -> None:
+def test_malformed_start_is_rejected_with_the_reason(refused: Refused, start: str, said: str) -> None:
     assert said in refused(f"start: {start}\n")
 
 
@@ -209,13 +209,13 @@ def test_gravity_in_centimetres_raises_a_warning(loaded: Loaded) -> None:
         ("walker: {type: quadruped}\n", "walkerlab's walkers have two legs"),
     ],
 )
-def test_keys_beyond_scope_are_rejected_with_the_reason(refused: Refused, text: str, why: str) -> None:
+def test_keys_for_features_out_of_scope_are_rejected_with_the_reason(refused: Refused, text: str, why: str) -> None:
     message = refused(text)
     assert f"; {why}" in message
     assert "did you mean" not in message
 
 
-def test_no_existing_key_or_config_counts_as_beyond_scope() -> None:
+def test_existing_keys_and_configs_are_not_called_out_of_scope() -> None:
     names = {part for key in keys() for part in key.key.split(".")}
     assert [name for name in (*names, *builtin_names()) if explain_missing_feature(name)] == []
 
@@ -361,9 +361,7 @@ def test_config_error_exits_3_and_suggests_a_command(write: Write) -> None:
     assert "walkerlab schema" in caught.value.advice
 
 
-def test_method_of_a_missing_extra_names_the_package_to_install(
-    refused: Refused, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_method_of_an_uninstalled_package_names_that_package(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(schema, "find_spec", lambda name: None)
     message = refused("solver: {contact: {method: cvode-bdf}}\n")
     assert message.startswith("mine.yaml:1:")

@@ -1,4 +1,4 @@
-"""YAML text to a tree: YAML 1.2 scalars, positions, and texts that are no config."""
+"""Tests of reading YAML: YAML 1.2 scalars, positions in the text, and texts that are no config."""
 
 import math
 from typing import Any
@@ -145,7 +145,7 @@ def test_deep_nesting_is_rejected_without_recursion(opening: str) -> None:
     assert f"nested deeper than {MAX_DEPTH} levels" in message or "a key must be a word" in message
 
 
-def test_oversized_text_is_rejected_unread() -> None:
+def test_oversized_text_is_rejected_before_it_is_parsed() -> None:
     assert "not a config" in refusal("a" * (MAX_CHARACTERS + 1))
 
 

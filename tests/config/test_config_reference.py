@@ -1,4 +1,4 @@
-"""The reference lists every key there is, with what a reader needs to set it."""
+"""Check that the reference lists every key with all that a reader needs to set it."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Run identity: a changed config runs beside the unchanged one, in a folder that is named after the change."""
+"""Check that the results of a changed config go to a folder named after the change."""
 
 import re
 from pathlib import Path
@@ -62,7 +62,7 @@ def test_long_run_name_is_its_first_key_and_a_digest() -> None:
     assert first != second
 
 
-def test_long_run_name_keeps_the_changed_stage() -> None:
+def test_long_run_name_still_names_the_changed_stage() -> None:
     asked = ("design.maximise=speed_m_s", "design.over={slope_deg: [1, 3]}")
     assert re.fullmatch(r"paper@design-[0-9a-f]{8}", name_of("gravity_m_s2=1.62", *asked))
 

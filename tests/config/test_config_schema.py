@@ -1,4 +1,4 @@
-"""What the schema admits and refuses; every bound is checked at both of its sides."""
+"""Check what the schema accepts and rejects, on both sides of every bound."""
 
 import math
 from typing import Any
@@ -163,7 +163,7 @@ def test_number_must_be_finite_and_not_a_bool_or_string(value: Any) -> None:
     assert not admits(Config, strides=value)
 
 
-def test_leg_mass_is_in_the_middle_by_default() -> None:
+def test_leg_mass_is_half_way_up_the_leg_by_default() -> None:
     assert CompassWalker(leg_length_m=0.3).foot_to_mass_m == 0.15
 
 
@@ -171,7 +171,7 @@ def test_outputs_are_sorted_and_unique() -> None:
     assert Config.model_validate({"outputs": ["forces", "states", "forces"]}).outputs == ("states", "forces")
 
 
-def test_adams_units_convert_to_si() -> None:
+def test_adams_units_are_converted_to_si() -> None:
     in_si = Contact().to_si()
     assert in_si.stiffness == pytest.approx(3.98107170553e11, rel=1e-11)  # 1e5 * 10**6.6
     assert in_si.damping == 9.0e4

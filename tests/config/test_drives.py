@@ -1,4 +1,4 @@
-"""What drives a walker: where it is refused, and in which words."""
+"""Tests of the drives in configs, and of the messages with which they are rejected."""
 
 from pathlib import Path
 
@@ -37,6 +37,6 @@ def test_walkers_of_every_type_can_be_driven(name):
     assert springs_of(driven) == ("a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad")
 
 
-@pytest.mark.parametrize("number", Hip.model_fields)
+@pytest.mark.parametrize("number", [name for name, field in Hip.model_fields.items() if field.default == 0.0])
 def test_every_hip_parameter_has_a_description(number):
     assert len(acting_on(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1

@@ -1,4 +1,4 @@
-"""A small reader of ADAMS/Solver datasets (.adm), written from the format's description alone.
+"""Read ADAMS/Solver datasets (.adm). This small reader is written from the description of the format alone.
 
 It rebuilds parts, markers, joints and force expressions of planar models (motion in the x-y plane of the ground),
 evaluates the expressions as they are written, and integrates with SciPy. Every part has three coordinates (x, y of
@@ -211,7 +211,7 @@ def zero(*markers: int) -> float:
 
 
 class Motion:
-    """Where parts and markers of a dataset are at one state, and how they move: each is computed once."""
+    """Positions and velocities of a dataset's parts and markers at one state, each computed once."""
 
     def __init__(self, dataset, q, u) -> None:
         self.dataset, self.known = dataset, {}
@@ -239,7 +239,10 @@ class Motion:
             yield cos * ahead - sin * up, sin * ahead + cos * up
 
     def seen(self, first, i, j, k):
-        """A vector from J to I in the frame of K, either omitted for the ground's: from places or velocities."""
+        """Return the vector from J to I in the frame of K, from positions or velocities.
+
+        An omitted marker is the ground's.
+        """
         x, y = self.of(i)[first : first + 2]
         if j:
             there = self.of(j)
@@ -284,7 +287,7 @@ class Sensor:
 
 
 class HaltError(Exception):
-    """A sensor halted the run; the message says which, and when."""
+    """A sensor halted the run. The message names it and the time."""
 
 
 @dataclass
@@ -362,7 +365,7 @@ class Dataset:
         return float(eval(expression, self.environment(t, Motion(self, q, u))))
 
     def environment(self, t, motion):
-        """What an expression may name, at one state."""
+        """Return the names that an expression may use, with their values at one state."""
         names = FUNCTIONS | {"TIME": t, "PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
         names |= {"DX": motion.dx, "DY": motion.dy, "VX": motion.vx, "VY": motion.vy, "WZ": motion.spin}
         names |= {"AZ": motion.angle, "DZ": zero, "VZ": zero, "WX": zero, "WY": zero}
@@ -390,7 +393,7 @@ class Dataset:
 
     @cached_property
     def mass_upright(self) -> np.ndarray:
-        """The mass matrix without what turns with the parts."""
+        """Return the mass matrix without the terms that turn with the parts."""
         diagonal = [(p.mass, p.mass, p.inertia + p.mass * p.centre @ p.centre) for p in self.parts.values()]
         return np.diag(np.concatenate(diagonal))
 
@@ -441,7 +444,9 @@ class Dataset:
 
     @cached_property
     def joints(self) -> tuple[list[tuple[int, int, int]], np.ndarray]:
-        """(row, I, J) of the joints that hold two markers together, and what does not turn of all constraints' rows."""
+        """Return (row, I, J) of the joints that hold two markers together, and the constant part of all constraint
+        rows.
+        """
         pins, rows, width = [], [], 3 * len(self.parts)
         joints = {s.id: s for s in self.of("JOINT")}
         for s in joints.values():

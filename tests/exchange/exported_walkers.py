@@ -1,4 +1,4 @@
-"""Walkers to export, each with its rigid gait: built-in ones and random ones of every kind that is exported."""
+"""Walkers to export, each with its rigid gait: built-in ones, and random ones of every kind that can be exported."""
 
 from functools import cache
 from pathlib import Path
@@ -120,7 +120,9 @@ def run_kneed(name, *sets):
 
 
 def touches_of(dataset, export, count):
-    """When the feet touch ahead of each other, the model integrated from its initial conditions as written."""
+    """Return the times at which feet touch ahead of each other, integrating the model from its initial conditions as
+    written.
+    """
     names = export.names[export.hip_link], export.names[0]
     parts = [next(k for k, part in dataset.parts.items() if part.label == name) for name in names]
     marked = {dataset.markers[s.id].part: s.id for s in dataset.of("MARKER") if s.label == "foot"}

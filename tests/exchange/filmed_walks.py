@@ -1,4 +1,4 @@
-"""The walk of the built-in compass walker, as films, sensors and markers record it, and read back."""
+"""Recordings of the built-in compass's walk by films, sensors and markers."""
 
 import functools
 import math

@@ -1,4 +1,4 @@
-"""The tests' own reader of ADAMS datasets, on motions that are known without it."""
+"""Test the tests' own reader of ADAMS datasets on motions known from elsewhere."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Exported ADAMS models define our walker: rebuilt from their text alone they have its masses, forces and walk."""
+"""Check that exported ADAMS models, rebuilt from their text, have our walker's masses, forces and walk."""
 
 import re
 
@@ -58,7 +58,7 @@ def without_forces(dataset):
 
 
 def directions(dataset, q):
-    """(parts' velocities, tree's velocities): how the parts move as the tree does."""
+    """Return (velocities of parts, velocities of the tree): how the parts move as the tree does."""
     return np.column_stack([hung(dataset, q, unit)[1] for unit in np.eye(q.size)])
 
 
@@ -135,7 +135,7 @@ def test_exported_model_reproduces_the_walk(seed):
 
 @pytest.mark.parametrize("walker", LIMPING[:3], ids=lambda walker: walker[0])
 def test_exported_model_of_legs_that_differ_reproduces_the_walk(walker):
-    """The fourth kind has knees: see below."""
+    """The fourth kind has knees and is tested below."""
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     assert export.walk.steps == 4
     expected = np.array(export.touches_s[:3])
@@ -161,7 +161,7 @@ def test_pads_of_legs_that_differ_lie_under_their_footholds():
 
 @pytest.mark.parametrize("walker", [LIMPING[3], ONE_KNEE], ids=["two knees", "one knee"])
 def test_commands_switch_the_knees_of_different_legs(walker):
-    """Their knees are damped, too."""
+    """The knees have dampers as well."""
     touches, locks, walk = run_kneed(*walker)
     assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)
     strikes = walk.knee_strike_time_s
@@ -209,7 +209,7 @@ def test_view_script_has_the_commands_of_the_command_file():
     }
 
 
-def test_no_constraint_is_redundant():
+def test_exported_adams_model_has_no_redundant_constraint():
     assert dataset_of("functions", "paper").degrees_of_freedom() == 4
     torso = dataset_of("functions", "torso", PADS)
     assert torso.degrees_of_freedom() == 4
@@ -315,7 +315,7 @@ def test_uneven_pads_are_exported_as_boxes():
     assert [tops[f"pad_{number}"] for number in range(1, 7)] == pytest.approx([0.0, 0.0, 0.0, 1.0, -2.0, -2.0])
 
 
-def test_view_commands_build_the_same_objects():
+def test_commands_for_adams_view_build_the_same_objects():
     walker = ("torso", PADS, "walker.hip.spring_N_m_per_rad=1")
     for law in ("contact", "functions"):
         dataset = dataset_of(law, *walker)

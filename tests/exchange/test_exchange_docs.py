@@ -1,4 +1,4 @@
-"""docs/exchange.md: its downloads are today's models, and its Python runs."""
+"""Check that the downloads of docs/exchange.md are current and that its Python runs."""
 
 import re
 from pathlib import Path
@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("name", ["paper.adm", "paper.acf", "paper.cmd", "paper.xml"])
 def test_downloads_equal_freshly_exported_models(folder, name):
-    """Up to rounding, and but for the line with the version."""
+    """They are equal up to rounding, except for the line with the version."""
     texts = [
         re.sub(r".*Written by walkerlab.*", "", path.read_text()) for path in (DOCS / "downloads" / name, folder / name)
     ]

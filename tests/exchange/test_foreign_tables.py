@@ -1,4 +1,4 @@
-"""Tables as spreadsheets, tracking programs and other countries write them."""
+"""Read tables as spreadsheets, tracking programs and other countries write them."""
 
 import codecs
 import os
@@ -105,7 +105,7 @@ def test_cell_that_is_not_a_number_is_quoted(cell, tmp_path):
         read(tmp_path, "walk.csv", table(rows, delimiter=";"))
 
 
-def test_decimal_commas_between_commas_get_advice(tmp_path):
+def test_decimal_commas_in_a_file_separated_by_commas_get_advice(tmp_path):
     with pytest.raises(ConfigError, match="no header") as caught:
         read(tmp_path, "walk.csv", table(with_commas()))
     assert "decimal commas need semicolons, tabs or quotes" in caught.value.advice

@@ -1,4 +1,4 @@
-"""Heel strikes of recordings that are cut anywhere, noisy, swapped, turned or off."""
+"""Find heel strikes in recordings that are cut anywhere, noisy, or have swapped, rotated or biased angles."""
 
 import functools
 import math
@@ -351,7 +351,7 @@ def test_missing_marker_is_a_gap_but_a_foot_at_the_origin_is_not(tmp_path):
 
 
 @pytest.mark.parametrize("marker", [0, 1])
-def test_a_frozen_marker_is_a_gap_and_a_foot_that_stands_still_is_not(marker, tmp_path):
+def test_frozen_marker_is_a_gap_and_a_foot_that_stands_still_is_not(marker, tmp_path):
     places = places_of(sampled()[1])
     assert np.ptp(places[75:100, 1], axis=0).max() < 1e-9
     places[150:157, marker] = places[149, marker]
@@ -364,7 +364,7 @@ def test_a_frozen_marker_is_a_gap_and_a_foot_that_stands_still_is_not(marker, tm
     assert re.search(r"at samples 1(4[5-9]|5[0-4]) to 165", refused.value.message)
 
 
-def test_a_frozen_angle_is_a_gap_and_coarse_digits_are_not(tmp_path):
+def test_frozen_angle_is_a_gap_and_coarse_digits_are_not(tmp_path):
     time, angle = sampled()
     rounded = np.degrees(angle).round(1)
     assert read(tmp_path, time, rounded, "time (s),angle 1 (deg),angle 2 (deg)")["doubts"] == []
@@ -441,7 +441,7 @@ def test_shank_angles_of_a_kneed_walker_are_reported(name, count):
 
 
 @pytest.mark.parametrize("fps", [25.0, 50.0, 240.0])
-def test_two_stated_errors_contain_95_percent_of_the_strikes(fps, tmp_path):
+def test_95_percent_of_strikes_lie_within_two_standard_errors(fps, tmp_path):
     errors = []
     for seed in range(12):
         summary = read(tmp_path, *sampled(begin=0.2 + 0.03 * seed, fps=fps, noise=1e-3, seed=seed))

@@ -1,4 +1,4 @@
-"""Exported MJCF: it compiles silently, carries the walker at the law's depth, and walks as our contact model does."""
+"""Check that exported MJCF compiles without warnings, and sinks in and walks as our contact model does."""
 
 import importlib.util
 import shutil
@@ -36,7 +36,7 @@ WEIGHED = [*WALKERS, ("level",), HEAVY_LEGS, SPRUNG, BY_PARTS, KNEED, ROUND_KNEE
 
 @pytest.fixture(autouse=True)
 def no_callback():
-    """MuJoCo's callbacks are global, and no model compiles while a Python callback is set."""
+    """Remove the callback: MuJoCo's callbacks are global, and no model compiles while a Python callback is set."""
     yield
     mujoco.set_mjcb_control(None)
 
@@ -57,7 +57,7 @@ def at_start(model):
 
 
 def walked(model, steps):
-    """Touches (s) and places (m) of a swing foot that meets its pads ahead of the stance foot."""
+    """Return the touches (s) and positions (m) of a swing foot that meets its pads ahead of the stance foot."""
     data, stance, touches = at_start(model), 1, []
     feet = [model.geom(f"foot_{foot}").id for foot in (1, 2)]
     while len(touches) < steps and data.time < 1.2 * steps:
@@ -72,7 +72,7 @@ def walked(model, steps):
 
 @pytest.fixture(params=WEIGHED, ids=" ".join)
 def weighed(request, tmp_path_factory):
-    """A walker to export: each exported type, and walkers with other masses and drives."""
+    """A walker to export: one of each exported type, and walkers with other masses and drives."""
     if request.param is not BY_PARTS:
         return request.param
     path = tmp_path_factory.getbasetemp() / "compass-by-parts.yaml"

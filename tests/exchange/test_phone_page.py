@@ -1,4 +1,4 @@
-"""Answers that the page 'From a phone to parameters' prints."""
+"""Check the answers that the page 'From a phone to parameters' prints."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Recordings whose slope or sensors are off: the rates' jumps say where heel strikes are."""
+"""Find heel strikes by jumps of the rates in recordings with an unknown slope or offset."""
 
 import math
 from pathlib import Path
@@ -69,7 +69,7 @@ def test_heel_strikes_are_found_with_offset_angles():
     assert np.diff(steps.touch_time_s) == pytest.approx(0.7036, abs=0.01)
 
 
-def test_squares_around_an_instant_are_those_of_a_direct_fit():
+def test_sums_of_squares_around_an_instant_equal_those_of_a_direct_fit():
     rng = np.random.default_rng(5)
     time = np.sort(rng.uniform(-1.0, 1.0, 80))
     angle = np.column_stack((np.sin(3.0 * time), np.abs(time))) + 1e-3 * rng.standard_normal((80, 2))
@@ -82,4 +82,4 @@ def test_squares_around_an_instant_are_those_of_a_direct_fit():
             columns += [np.where(side, time - instant, 0.0) ** power for power in range(1, degree + 1)]
         basis = np.column_stack(columns)
         direct.append(np.sum((angle - basis @ np.linalg.lstsq(basis, angle)[0]) ** 2))
-    assert squares_around(time, angle, instants, 5, 3) == pytest.approx(direct, rel=1e-6)
+    assert squares_around([(time, angle)], instants[None], 5, 3)[0] == pytest.approx(direct, rel=1e-6)

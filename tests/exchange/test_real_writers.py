@@ -1,4 +1,4 @@
-"""Files written by the programs that people use, by their own functions, where they are installed."""
+"""Read files written by the programs that people use, if these are installed."""
 
 import datetime
 import math
@@ -69,7 +69,7 @@ def gaps_of(path):
 
 
 def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
-    """Also where a position stands in the gap."""
+    """This holds even if the gap contains a position."""
     path = tmp_path / "walk.c3d"
     residuals = np.zeros((1, 3, TIMES.size))
     residuals[0, 2, [7, 8]] = -1.0
@@ -81,7 +81,7 @@ def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
 
 @pytest.mark.parametrize("scale", [-1.0, 0.1])
 def test_negative_residual_written_by_c3d_is_a_gap(scale, tmp_path):
-    """Stored as floating-point numbers or, with a positive scale, as integers."""
+    """The file stores floating-point numbers or, with a positive scale, integers."""
     pytest.importorskip("ezc3d", reason="ezc3d, which reads C3D, is not installed")
     c3d = pytest.importorskip("c3d", reason="c3d is not installed")
     path = tmp_path / "walk.c3d"
@@ -120,7 +120,7 @@ def test_data_frame_with_a_default_index_is_read(style, tmp_path):
 
 
 def test_data_frame_with_the_time_as_index_is_read(tmp_path):
-    """As kineticstoolkit's to_dataframe() makes it; its header begins with an empty cell."""
+    """kineticstoolkit's to_dataframe() writes such a frame. Its header begins with an empty cell."""
     path = tmp_path / "walk.csv"
     frame(TIMES).to_csv(path)
     walk = walk_of(path, {"time": "column 1"}, {"time": "s"})
@@ -278,14 +278,14 @@ def poses():
 
 
 @pytest.mark.parametrize("writer", ["to_dlc_file", "to_lp_file"])
-def test_poses_of_movement_have_three_header_rows(writer, tmp_path):
+def test_poses_written_by_the_package_movement_are_read_with_three_header_rows(writer, tmp_path):
     save_poses, data = poses()
     getattr(save_poses, writer)(data, tmp_path / "film.csv")
     doubts = walk_right(tmp_path, "film_walker.csv", columns=LEGS, fps=FPS, min_likelihood=0.6)
     assert "FOOT1.x, FOOT1.y at samples 201 to 205 (likelihoods below 0.6" in doubts[0]
 
 
-def test_poses_of_movement_may_name_their_individual(tmp_path):
+def test_poses_written_by_the_package_movement_may_name_an_individual(tmp_path):
     save_poses, data = poses()
     save_poses.to_dlc_file(data, tmp_path / "film.csv", split_individuals=False)
     columns = {name: line.replace("HIP", "walker.HIP").replace("FOOT", "walker.FOOT") for name, line in LEGS.items()}

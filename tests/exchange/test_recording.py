@@ -1,4 +1,4 @@
-"""Files that other programs and people write, read into columns and quantities."""
+"""Read columns and quantities of files that other programs and people write."""
 
 import math
 
@@ -67,7 +67,7 @@ def markers():
 
 
 def with_column(text, name, cells):
-    """A table with one more column."""
+    """Return a table with one more column."""
     return "\n".join(f"{line},{cell}" for line, cell in zip(text.splitlines(), [name, *cells], strict=True))
 
 
@@ -97,7 +97,7 @@ def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
 
 
 def test_unit_of_one_component_applies_to_it_alone(tmp_path):
-    """Also where that component is the time."""
+    """That component may be the time."""
     text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
     walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), Recorded())
     assert walk.time_s == pytest.approx(TIMES / 1000.0, abs=1e-12)
@@ -145,7 +145,7 @@ def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_gap_is_left_out_of_a_used_column(tmp_path):
+def test_sample_missing_from_a_used_column_is_omitted(tmp_path):
     places = markers()
     text = marker_file(TIMES, places).replace(repr(float(places[2, 2, 0])), "")
     recording = read_recording(written(tmp_path, "walk.trc", text))

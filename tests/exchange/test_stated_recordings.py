@@ -1,4 +1,4 @@
-"""What a file does not say is stated by keys: tilt, direction, belt, frame rate, part, likelihood, signs, constants."""
+"""Tests of keys for what a file does not say: tilt, direction, belt, frame rate, part, likelihood, signs, constants."""
 
 import math
 import re
@@ -63,7 +63,7 @@ def test_sign_and_offset_of_a_column_can_be_stated(header, change, source, tmp_p
         ("angle 1+90", r"has no column 'angle 1\+90'"),
     ],
 )
-def test_a_constant_without_a_unit_of_angles_is_refused(source, message, tmp_path):
+def test_constant_offset_without_an_angle_unit_is_refused(source, message, tmp_path):
     time, angle = sampled()
     with pytest.raises(ConfigError, match=message):
         read(tmp_path, time, angle, columns={"angle 1": source})
@@ -84,7 +84,7 @@ def test_quotes_protect_commas_in_options():
     }
 
 
-def test_a_line_may_have_a_constant_but_no_sign(tmp_path):
+def test_angle_of_a_marker_line_may_have_an_offset_but_no_sign(tmp_path):
     places = places_of(sampled()[1])
     turn = np.array([[math.cos(TILT), -math.sin(TILT)], [math.sin(TILT), math.cos(TILT)]])
     places[:, 1, :2] = places[:, 0, :2] + (places[:, 1, :2] - places[:, 0, :2]) @ turn.T
@@ -120,7 +120,7 @@ def test_level_camera_has_no_estimated_tilt(tmp_path):
     assert abs(tilt) < 0.05
 
 
-def test_a_free_tilt_and_a_free_offset_are_one_unknown():
+def test_free_tilt_and_a_free_offset_are_one_unknown():
     with pytest.raises(ConfigError, match="camera_tilt_deg: free estimates already"):
         load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[angle_offset_rad]"))
     block = load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[clock_rate]")).config.identify
@@ -181,13 +181,13 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
     assert summary["doubts"] == ["The file's times, 30 frames/s, are replaced by 240 frames/s."]
 
 
-def test_a_table_without_times_counts_samples_as_frames(tmp_path):
+def test_table_without_times_counts_samples_as_frames(tmp_path):
     _, angle = sampled(fps=60.0)
     path = table(tmp_path, "angle 1 (rad),angle 2 (rad)", angle)
     assert all_steps_are_right(steps_of(path, fps=60.0), period=2e-5, length=2e-5)
 
 
-def test_a_column_that_does_not_count_frames_is_refused(tmp_path):
+def test_column_stated_as_frames_must_count_them(tmp_path):
     time, angle = sampled()
     path = table(tmp_path, "seconds,angle 1 (rad),angle 2 (rad)", zip(time, *angle.T, strict=True))
     with pytest.raises(ConfigError, match="'seconds' does not count frames"):
@@ -214,7 +214,7 @@ def test_clock_times_are_seconds(style, tmp_path):
     assert all_steps_are_right(summary)
 
 
-def test_a_part_of_a_recording_is_read(tmp_path):
+def test_part_of_a_recording_can_be_read(tmp_path):
     time, angle = sampled()
     summary = read(tmp_path, time, angle, from_s=1.0, to_s=4.0)
     assert summary["first_heel_strike_s"] == pytest.approx(2.0 * PERIOD_S, abs=1e-4)
@@ -224,7 +224,7 @@ def test_a_part_of_a_recording_is_read(tmp_path):
     assert "--from-s" in refused.value.advice
 
 
-def test_a_table_without_rows_holds_no_sample(tmp_path):
+def test_table_without_rows_has_no_samples(tmp_path):
     path = tmp_path / "walk.mot"
     path.write_text("Coordinates\nversion=1\ninDegrees=yes\nendheader\ntime\tangle 1\tangle 2\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="has no sample with values of"):
@@ -327,7 +327,7 @@ def test_slope_is_estimated_from_angles_measured_from_the_floors_normal(tilt, tm
 # Sports2D
 
 
-def test_the_slope_of_a_film_of_sports2d_needs_a_statement_about_the_floor(tmp_path):
+def test_slope_of_a_sports2d_film_is_estimated_only_if_the_floor_is_stated(tmp_path):
     path = tmp_path / "walk.mot"
     path.write_text(sports2d_angles(angles_at(sampled()[0]) + SLOPE), encoding="utf-8")
     columns = {"angle 1": "right thigh+90deg", "angle 2": "left thigh+90deg"}

@@ -48,7 +48,7 @@ class Toy:
         return execute(loaded, target, folder, Options(**options, dry=True), graph=self.graph)
 
     def edit(self, module, old, new):
-        """Change the source of a toy stage; this process goes on with what it has imported."""
+        """Change the source of a toy stage. This process keeps the version that it has imported."""
         path = self.source / "toy" / f"{module}.py"
         text = path.read_text()
         assert old in text
@@ -65,7 +65,7 @@ def toy(tmp_path, monkeypatch):
 
 
 class Listener:
-    """A reporter that remembers, of all stages alike."""
+    """A reporter that records the events of all stages."""
 
     def __init__(self):
         self.notes, self.warnings, self.started, self.begun, self.ended, self.pages = [], [], [], [], [], []

@@ -1,4 +1,4 @@
-"""Long campaigns: run with `--full` only, kept once there, and gone on with where a run was cut off."""
+"""Tests of long campaigns: only with `--full`, kept when complete, and resumed after an interruption."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def states(toy, *sets):
 
 
 def cut_off(toy, monkeypatch, after, **options):
-    """A run of the census that is interrupted after so many stones."""
+    """Run the census, and interrupt it after some stones."""
     monkeypatch.setenv("TOY_STONES", str(after))
     with pytest.raises(KeyboardInterrupt):
         toy.execute("census", **options)
@@ -88,5 +88,5 @@ def test_option_force_restarts_the_campaign(toy, monkeypatch):
     assert (toy.runs / "paper" / "census.parts").read_bytes().count(b"\n") == 1 + 2
 
 
-def test_preview_lists_the_campaign(toy):
+def test_dry_run_lists_the_campaign(toy):
     assert actions(toy.preview("survey", full=True)) == {"survey": "run", "census": "run"}

@@ -1,4 +1,4 @@
-"""What is compiled ahead is all that a config's stages call; and the same walks run without a compiler."""
+"""Check that all kernels of a config's stages are compiled ahead, and that the same walks run without a compiler."""
 
 import importlib.util
 import os

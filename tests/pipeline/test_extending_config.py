@@ -1,4 +1,4 @@
-"""Parameters that a stage finds become a config in the run's folder, from Python as from the command line."""
+"""Check that parameters found by a stage become a config in the run's folder, from Python and the command line."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a command is asked about is refused where it stands, before anything runs."""
+"""Check that wrong requests are rejected before anything runs."""
 
 import re
 

@@ -44,7 +44,7 @@ def test_current_results_are_reused(toy):
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def test_change_reruns_only_the_affected_stages(toy):
+def test_changed_key_reruns_only_the_affected_stages(toy):
     toy.execute("page", config="paper")
     config, folder = toy.loaded("strides=7")
     again = execute(config, "page", type(folder)(folder.runs_dir, "paper"), graph=toy.graph)
@@ -60,7 +60,7 @@ def test_change_reruns_only_the_affected_stages(toy):
     assert reasons(again)["picture"] == "input roll changed"
 
 
-def test_experiment_does_not_overwrite_another_run(toy):
+def test_changed_config_does_not_overwrite_another_run(toy):
     toy.execute("roll")
     before = (toy.runs / "paper" / "roll.h5").read_bytes()
     assert toy.execute("roll", "strides=7").run_dir == toy.runs / "paper@strides=7"
@@ -158,7 +158,7 @@ def test_contact_stage_fails_and_drawings_omit_it_without_a_contact_block(toy):
     assert not (report.run_dir / "bounce.h5").exists()
 
 
-def test_walker_without_possible_contact_is_not_advised_to_add_it(toy):
+def test_walker_without_a_contact_model_is_not_advised_to_add_contact(toy):
     with pytest.raises(ConfigError, match="next to no mass") as refused:
         toy.execute("bounce", config="simplest")
     assert refused.value.exit_code == 3

@@ -1,4 +1,4 @@
-"""Stages in processes side by side: the same results, told as they come, with a page before all is there."""
+"""Tests of stages in parallel processes: same results, reported as they come, and a page before all are complete."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Units of work: each is kept as soon as it is there, what is kept is not computed again, and no worker is missed."""
+"""Tests of units of work: each is kept as soon as it is complete, and none is computed twice or lost with a worker."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""What a config with a contact block becomes, and where its walker starts."""
+"""Tests of the scene that a config with a contact block gives, and of its start."""
 
 import functools
 import math
@@ -48,7 +48,7 @@ def test_walk_starts_with_the_stance_foot_touching_and_rolling(radius, theta_2, 
 
 
 def test_point_foot_starts_like_the_pinned_foot():
-    """Without a radius rolling and turning about the hinge are one."""
+    """For a foot without radius, rolling is turning about the hinge."""
     rigid = (-0.2042, 0.1694, -0.6, -0.86)
     free, pinned = (
         start_state(scene_of("walker.foot_radius_m=0", f"contact.stance={stance}"), rigid)

@@ -1,4 +1,4 @@
-"""Identified walkers with doubtful errors: noise that the floor hides, outliers, contradictions, other disturbances."""
+"""Tests of identified walkers with doubtful errors: hidden noise, outliers, and contradictions."""
 
 import re
 import tracemalloc
@@ -172,7 +172,7 @@ def test_outliers_do_not_change_noise_or_errors_of_a_soft_loss():
     assert soft.rms_residual["step_period_s"] > 3.0 * soft.measurement["step_period_s"]
 
 
-def test_soft_loss_agrees_with_the_linear_one_without_outliers():
+def test_soft_loss_changes_nothing_without_outliers():
     fit = {"slope_deg": None, LEG: None}
     linear, soft = (values(identify(measured_steps(), fit=fit, loss=loss)) for loss in ("linear", "soft_l1"))
     for key in fit:

@@ -1,4 +1,4 @@
-"""What ended walks, in words: pads are told from the walker's own limits."""
+"""Tests of sentences on the ends of walks: trips on pads differ from falls."""
 
 from pathlib import Path
 

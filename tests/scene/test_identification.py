@@ -1,4 +1,4 @@
-"""Parameters identified from synthetic walks, and walks that no walker explains."""
+"""Identify parameters from synthetic walks, and recognise walks that no walker explains."""
 
 import runpy
 from dataclasses import replace
@@ -39,7 +39,7 @@ def verdict(result):
 
 
 def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
-    """Of twelve walks more than two lie outside with a probability of 2 %; the script does a thousand."""
+    """More than two of twelve walks lie outside with a probability of 2 %. The script checks a thousand."""
     inside, estimates, errors, _ = CAMPAIGN["coverage"](truth(), range(12))
     assert inside.sum() >= 10
     ratio = np.sqrt((errors**2).mean(axis=0)) / np.abs(estimates - truth().values).std(axis=0, ddof=1)
@@ -47,7 +47,7 @@ def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
 
 
 def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
-    """By least squares they are a quarter too small."""
+    """Plain least squares makes them a quarter too small."""
     paper = truth("steps", "paper", CAMPAIGN["WALKERS"]["paper"])
     measured = [paper.identify(*paper.walk(seed)).measured_radius for seed in range(8)]
     plain, corrected, errors = np.array([(each.plain, each.value, each.standard_error) for each in measured]).T

@@ -1,4 +1,4 @@
-"""Each reduced scene gives the numbers of the full one with the part set to nothing."""
+"""Check that each reduced scene gives the numbers of the full one without the omitted part."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +38,7 @@ def walker_with(radius=0.001, friction=None):
 
 
 def over(walker, foot, height, theta, omega, velocity):
-    """The state in which the lowest point of a foot is at a height over the ground."""
+    """Return the state in which the lowest point of a foot is at a height above the ground."""
     state = (0.0, 1.0, *theta, *velocity, *omega)
     return (0.0, 1.0 + height - feet_motion(walker.whole, state)[foot].height, *state[2:])
 
@@ -48,7 +48,7 @@ def same_to_rounding(found, expected, scale):
 
 
 def stiffest(walker, y):
-    """By how much the ground magnifies the rounding of a foot's height: the force's gradient over the masses."""
+    """Return the factor by which the ground magnifies rounding of a foot's height: force gradient over mass."""
     J = gradient_of(place_on_ground(walker, BOTH), y)
     return np.abs(J).max()
 
@@ -97,7 +97,7 @@ def test_point_foot_is_a_ball_of_radius_zero(state):
 
 
 @given(state=states, clearance=st.floats(1e-9, 0.5))
-def test_foot_in_the_air_moves_as_without_ground(state, clearance):
+def test_foot_in_the_air_moves_as_if_there_were_no_ground(state, clearance):
     walker = walker_with()
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)
@@ -200,7 +200,7 @@ def test_stated_savings_of_a_scene_are_correct():
 
 @pytest.mark.parametrize("sets", [("outputs=[]", "contact.friction=none"), ("walker.leg_inertia_kg_m2=0.1",)])
 def test_preview_lists_the_same_omissions_as_the_result(tmp_path, sets):
-    """A preview knows it from the config; nothing has run."""
+    """The preview derives them from the config before anything has run."""
     found = load(None, (*sets, "strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714"))
     folder = RunFolder(tmp_path, found.run_name)
     before = execute(found.config, "contact-sim", folder, Options(dry=True)).left_out

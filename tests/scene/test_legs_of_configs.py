@@ -1,4 +1,4 @@
-"""Configs with `leg_2`: the second leg that they describe, its contact walk, and what needs equal legs."""
+"""Tests of configs with `leg_2`: the second leg, its contact walk, and the stages that need equal legs."""
 
 import math
 
@@ -8,7 +8,6 @@ import pytest
 from walkerlab.config.drives import drives_of
 from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
-from walkerlab.config.walkers import second_leg_of
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
@@ -42,7 +41,7 @@ def gait_of(config):
 
 def test_keys_of_leg_2_replace_those_of_leg_1():
     walker = config_of("paper", "walker.leg_2={leg_mass_kg: 5.5, foot_to_mass_m: 0.48}").walker
-    second = second_leg_of(walker)
+    second = walker.second
     assert (second.leg_mass_kg, second.foot_to_mass_m, second.leg_length_m) == (5.5, 0.48, 1.0)
     assert walker.total_mass_kg == 5.0 + 5.5 + 10.0
     first, other = assembly_of(walker).bodies
@@ -162,7 +161,7 @@ def test_exchanged_labels_give_the_same_contact_gait_half_a_stride_later(name, f
     assert abs(one.multipliers[0]) == pytest.approx(abs(other.multipliers[0]), rel=1e-4)
 
 
-def test_a_damped_knee_takes_the_same_work_from_both_models():
+def test_damped_knee_takes_the_same_work_from_both_models():
     config = config_of("kneed", "walker.knee.damping_N_m_s_per_rad=0.01", "strides=4")
     rigid = gait_of(config)
     scene = scene_on_pads(config, rigid.step_length, rigid.state)
@@ -228,7 +227,7 @@ def test_stage_that_needs_equal_legs_rejects_different_ones():
     assert tune.why_unsuited(config_of("paper")) is None
 
 
-def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
+def test_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     block = "{over: walker.leg_2.leg_mass_kg, from: 4.9, to: 5.1, model: rigid, periods: 2, points: 30}"
     config = config_of("paper", f"continuation={block}")
     assert config.walker.leg_2 is None
@@ -294,7 +293,7 @@ def test_multipliers_of_a_one_kneed_walker_on_compliant_ground_equal_differences
     np.testing.assert_allclose(np.array(columns).T, DP, atol=1e-3 * np.abs(DP).max())
 
 
-def test_a_peg_leg_is_by_default_the_first_leg_with_its_knee_locked():
+def test_peg_leg_is_by_default_the_first_leg_with_its_knee_locked():
     walker = rigid_walker(config_of("kneed", "walker.leg_2={type: straight-legs}"))
     assert walker.kneed
     assert not walker.exchanged.kneed

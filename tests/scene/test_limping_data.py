@@ -1,4 +1,4 @@
-"""Legs that differ in measured walks, which a plain integration of both swings makes."""
+"""Identify legs that differ from walks by a plain integration of both swings."""
 
 from functools import cache
 from pathlib import Path
@@ -42,7 +42,7 @@ def measured(heavier, level, seed=1):
 
 
 def begun(walk, leg, stated=None):
-    """Twenty steps of a walk from its first step with this leg on; `stated` is what the data say about the leg."""
+    """Return twenty steps of a walk that begins with this leg. `stated` is what the data say about the leg."""
     part = slice(leg - 1, leg + 19)
     return MeasuredWalk(walk.periods_s[part], walk.lengths_m[part], first_leg=stated)
 
@@ -94,7 +94,7 @@ def test_data_that_do_not_say_which_leg_begins_leave_both_answers():
     assert "The data do not say which leg swings first" in text
 
 
-def test_equal_legs_are_no_limp():
+def test_walk_of_equal_legs_is_not_called_a_limp():
     result = identify(begun(measured(0.0, "steps"), 1), MASS)
     (difference,) = result.leg_differences
     assert abs(difference.value) < 3.0 * difference.standard_error
@@ -108,7 +108,7 @@ def test_limp_of_equal_legs_leads_to_the_option_that_explains_it(heavier, leg):
     assert any(f"--fit {MASS}" in reason for reason in result.verdict.reasons)
 
 
-def test_even_steps_lead_to_no_second_leg():
+def test_equal_steps_do_not_suggest_a_second_leg():
     result = identify(begun(measured(0.0, "steps"), 1), "slope_deg")
     assert not any("leg_2" in reason for reason in result.verdict.reasons)
 

@@ -1,4 +1,4 @@
-"""Planned measurements: expected errors against a dense normal distribution, and how they change with what is known."""
+"""Tests of planned measurements: expected errors compared with a dense normal distribution, and what reduces them."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD
-from walkerlab.scene.measurement_plan import ANGLES, plan_measurements, predict_measured, walk_of
+from walkerlab.pipeline.stages.plan import ANGLES, plan_measurements, predict_measured, walk_of
 from walkerlab.scene.subject import find_model_gait
 
 KEYS = ("slope_deg", "walker.leg_length_m")

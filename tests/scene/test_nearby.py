@@ -1,4 +1,4 @@
-"""Where a walker without a gait has one: along the slope, and with its feet ahead of its shanks."""
+"""Find the nearest gait of a walker without one: on another slope, or with its feet ahead of its shanks."""
 
 import math
 import re

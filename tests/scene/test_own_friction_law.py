@@ -1,4 +1,4 @@
-"""A law of friction says what is asked of it itself, so that one of a user's own is treated as ADAMS's is."""
+"""Check that a user's own friction law is treated as ADAMS's is, from what it declares."""
 
 import math
 from dataclasses import replace
@@ -56,18 +56,18 @@ class Regularised(NamedTuple):
 
 @pytest.fixture
 def own(monkeypatch):
-    """The paper's walker on ground with that law."""
+    """Return the paper's walker on ground with that law."""
     monkeypatch.setitem(
         friction.friction_coefficient._bodies,
         Regularised,
         lambda law, slip: (-law.mu * math.tanh(slip / law.v_0), -law.mu / law.v_0 / math.cosh(slip / law.v_0) ** 2),
     )
-    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Regularised)
+    monkeypatch.setitem(FRICTION_LAWS.laws, "coulomb", Regularised)
     return contact_scene(load().config, 0.3714)
 
 
 class Wordless(NamedTuple):
-    """A law of which half is left out."""
+    """A law with half of its parts missing."""
 
     mu: float
 
@@ -79,7 +79,7 @@ class Wordless(NamedTuple):
 
 
 def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
-    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
+    monkeypatch.setitem(FRICTION_LAWS.laws, "coulomb", Wordless)
     with pytest.raises(ConfigError) as said:
         contact_scene(load().config, 0.3714)
     assert str(said.value) == (
@@ -91,7 +91,7 @@ def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
 @pytest.mark.parametrize("stage", ["contact-sim", "report"])
 def test_incomplete_law_is_rejected_before_anything_runs(stage, monkeypatch, tmp_path):
     config = load().config
-    monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
+    monkeypatch.setitem(FRICTION_LAWS.laws, "coulomb", Wordless)
     # only laws of other packages are checked beforehand
     monkeypatch.setitem(WORDS, "friction", ("none",))
     with pytest.raises(ConfigError, match="it lacks sliding_from, scale_creep, describe"):
@@ -112,12 +112,12 @@ def test_compiled_walk_rejects_a_friction_law_without_a_formula_by_name(own):
 
 
 def test_every_friction_option_of_the_config_has_a_law():
-    assert set(FRICTION_LAWS) == set(get_args(Contact.model_fields["friction"].annotation))
-    for word in FRICTION_LAWS:
+    assert set(FRICTION_LAWS.laws) == set(get_args(Contact.model_fields["friction"].annotation))
+    for word in FRICTION_LAWS.laws:
         assert Contact(friction=word).has_friction == (ground_laws(Contact(friction=word))[1].largest > 0.0)
 
 
-@pytest.mark.parametrize("word", FRICTION_LAWS)
+@pytest.mark.parametrize("word", FRICTION_LAWS.laws)
 def test_stated_properties_of_a_law_match_its_coefficient(word):
     law = ground_laws(Contact(friction=word))[1]
     slips = np.linspace(0.0, 3.0, 3001)
@@ -132,7 +132,7 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
-def test_steepest_change_bounds_a_fall_that_is_steeper_than_the_rise():
+def test_slope_bound_covers_a_friction_law_that_drops_faster_than_it_rises():
     law = Coulomb(static=0.9, dynamic=0.7, stiction_velocity=0.1, friction_velocity=0.11)
     span = 1e-4
     changes = [
@@ -144,7 +144,7 @@ def test_steepest_change_bounds_a_fall_that_is_steeper_than_the_rise():
 
 
 def test_friction_laws_have_different_descriptions():
-    said = [ground_laws(Contact(friction=word))[1].describe() for word in FRICTION_LAWS]
+    said = [ground_laws(Contact(friction=word))[1].describe() for word in FRICTION_LAWS.laws]
     assert len(set(said)) == len(said)
     assert said[0] == (
         "ADAMS's Coulomb friction, with a coefficient of 0.9 at a slip velocity of 0.1 m/s and 0.7 above 1 m/s"

@@ -1,4 +1,4 @@
-"""Every number of the schema, on every type of walker, is a parameter or is refused in words."""
+"""Check that every number of the schema is a parameter, or is rejected with a reason, for every type of walker."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ def config(request):
 
 
 def numbers_of(config, second_leg=False):
-    """The keys of the config's own walker that hold a number in it, or in its first leg."""
+    """Return the keys of the config's walker whose values, in it or in its first leg, are numbers."""
     for path, field in leaves(Config, held=config):
         held = config
         for name in path:
@@ -102,7 +102,7 @@ def test_setting_a_parameter_to_its_current_value_leaves_the_walker_unchanged(co
         ("paper", "contact.terrain", "is not a number"),
     ],
 )
-def test_key_without_continuation_is_rejected_with_the_reason(name, key, said):
+def test_key_that_cannot_be_continued_is_rejected_with_a_reason(name, key, said):
     with pytest.raises(ConfigError) as caught:
         parameter_of(key, load(Path(name)).config)
     assert f"{key} {said}" in str(caught.value)

@@ -1,4 +1,4 @@
-"""Walkers described in YAML: types, limits, own parts, and what is refused."""
+"""Tests of walkers in YAML: types, limits, parts, and rejected descriptions."""
 
 import math
 import re
@@ -54,7 +54,7 @@ def kneed_with_feet_ahead(radius_m):
 
 
 def by_its_parts(radius_m):
-    """The same, put together from its parts."""
+    """Return the same walker, built from its parts."""
     limbs = {
         "thigh": "mass_kg: 2.345, centre_m: [0.0, -0.2], inertia_kg_m2: 0.02",
         "shank": "mass_kg: 1.013, centre_m: [0.0, -0.24], inertia_kg_m2: 0.02",

@@ -1,13 +1,15 @@
 """Drives of a walker: keys of the blocks `walker.hip` and `push_off`."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from walkerlab.config.fields import Block, key, short_number
 from walkerlab.config.second_leg import SecondPushOff
+from walkerlab.extensions import WORDS, origin_of, words
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
+LINEAR: Final = WORDS["hinge_law"][0]
 MAX_LEG_SPEED: Final = 1e4  # rad/s, to which hip torques may drive a leg; excludes nearly massless legs
 
 
@@ -25,6 +27,18 @@ class Hip(Block):
         ge=-STRONGEST,
         le=STRONGEST,
     )
+
+    hinge_law: Literal[words("hinge_law")] = key(  # type: ignore[valid-type]
+        LINEAR,
+        "",
+        "law of the torques at the hinges, hip and knees, that the parameters belong to; extensions add others",
+        "this project" + origin_of("hinge_law"),
+    )
+
+    @property
+    def parameters(self) -> tuple[float, float, float]:
+        """Parameters of the law, in its order."""
+        return self.spring_N_m_per_rad, self.damping_N_m_s_per_rad, self.torque_N_m
 
     def too_quick_for(self, inertia: float) -> bool:
         """Whether the torques would swing a leg with this inertia about the hip (kg m^2) too fast to integrate."""
@@ -60,8 +74,9 @@ def drives_of(config: Any) -> tuple[str, ...]:
 
 def springs_of(config: Any) -> tuple[str, ...]:
     """Describe the spring and damper between a walker's legs, which supply no energy."""
-    stiffness = config.walker.hip.spring_N_m_per_rad
-    damping = config.walker.hip.damping_N_m_s_per_rad
+    stiffness, damping, _ = config.walker.hip.parameters
+    if config.walker.hip.hinge_law != LINEAR:
+        return describe_nonzero({f"hinge torques of the law {config.walker.hip.hinge_law}": stiffness or damping})
     return describe_nonzero({
         f"a hip spring of {short_number(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short_number(damping)} N m s/rad": damping,

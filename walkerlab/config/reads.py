@@ -175,7 +175,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for other walkers. Their cases are variations of their own scene."""
+    """Keys that `stability` reads for a walker other than the paper's. Its extreme cases vary its own scene."""
 
     @property
     def stability(self) -> OwnCases: ...

@@ -64,7 +64,7 @@ class Recorded(Block):
         None,
         "s",
         "time at which the part to read ends",
-        bounds="any number, above from_s",
+        bounds="any number greater than from_s",
         default_in_words="the last sample",
     )
     min_likelihood: float | None = key(

@@ -22,7 +22,7 @@ from walkerlab.config.problems import (
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
-from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_leg_of
+from walkerlab.config.walkers import AssembledWalker, Kneed, followers
 from walkerlab.extensions import WORDS, external_extensions
 
 Location: TypeAlias = tuple[int | str, ...]
@@ -137,7 +137,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
 
 
 def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
-    """Return the values of a start that follow from others, by their place.
+    """Return the values of a start that follow from others, by index.
 
     Just after a heel strike both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
     for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
@@ -150,7 +150,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     if not isinstance(config.start, MidStep) and not isinstance(walker, AssembledWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
-        if second_leg_of(walker) is not walker:
+        if walker.second is not walker:
             swing = walker.swing_angle(values[1] + config.slope_rad)
             values[0] = values[0] if swing is None else swing - config.slope_rad
         following[0] = FollowingValue("theta_1", values[0], "rad", because)

@@ -19,7 +19,7 @@ from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKne
 from walkerlab.errors import ConfigError
 from walkerlab.extensions import declared, load
 
-WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
+WISSE: Final = "Wisse, Walking Simulation Example, MATLAB files, Delft University of Technology (2003): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
 MAX_LENGTH_M: Final = 1e3
@@ -94,6 +94,11 @@ class _Legged(Block):
     """Base class of all walkers: shared properties and checks."""
 
     @property
+    def second(self) -> Any:
+        """The walker with two legs like leg 2, or this walker itself if it has no `leg_2`."""
+        return self if getattr(self, "leg_2", None) is None else built_second(self)
+
+    @property
     def lean_rad(self: Any) -> float:
         """Angle (rad) between an upright leg and the line from hip to foot centre, or 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
@@ -104,7 +109,7 @@ class _Legged(Block):
 
         Angles are from the ground's normal. Returns None if leg 1 cannot reach the ground.
         """
-        second = second_leg_of(self)
+        second = self.second
         if second is self:
             return float(-2 * self.lean_rad - stance_rad)
         (own, own_radius), (other, radius) = (
@@ -117,12 +122,12 @@ class _Legged(Block):
     @property
     def foot_radii_m(self: Any) -> tuple[float, float]:
         """Radius (m) of each leg's foot."""
-        return self.foot_radius_m, second_leg_of(self).foot_radius_m
+        return self.foot_radius_m, self.second.foot_radius_m
 
     @property
     def total_mass_kg(self: Any) -> float:
         """Mass of the whole walker, kg."""
-        legs = self.leg_mass_kg + second_leg_of(self).leg_mass_kg
+        legs = self.leg_mass_kg + self.second.leg_mass_kg
         return float(legs + self.hip_mass_kg + torso_mass(self.torso))
 
     @field_validator("hip", check_fields=False)
@@ -175,11 +180,6 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
     for name, value in leg.model_dump(exclude_none=True).items():
         second[name] = {**dict(second[name]), **value} if isinstance(value, dict) else value
     return kind.model_validate(second)
-
-
-def second_leg_of(walker: Any) -> Any:
-    """Return the walker with two legs like leg 2, or the walker itself if it has no `leg_2`."""
-    return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
 
 
 @lru_cache
@@ -548,7 +548,7 @@ def leg_inertia(walker: Any) -> float:
 
 def why_no_push_off(walker: Any) -> str:
     """Explain why a walker cannot push off along its trailing leg, or return '' if it can."""
-    return why_no_push_on(walker) or why_no_push_on(second_leg_of(walker))
+    return why_no_push_on(walker) or why_no_push_on(walker.second)
 
 
 def why_no_push_on(walker: Any) -> str:
@@ -570,9 +570,7 @@ def why_no_push_on(walker: Any) -> str:
 
 def too_light_for_contact(walker: Any) -> str:
     """Explain why a walker cannot stand on compliant ground, or return '' if it can."""
-    lighter = (
-        min(each.leg_mass_kg for each in (walker, second_leg_of(walker))) if isinstance(walker, CompassWalker) else 1.0
-    )
+    lighter = min(each.leg_mass_kg for each in (walker, walker.second)) if isinstance(walker, CompassWalker) else 1.0
     share = lighter / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
         return ""
@@ -626,8 +624,9 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
 
 
 def load_walkers() -> dict[str, type[Block]]:
-    """Import the types of walkers that extensions add, by word. Those that cannot be imported are left out, with a
-    warning.
+    """Import the walker types that extensions add, by the word that names each in a config.
+
+    Types that cannot be imported are left out, with a warning.
     """
     types = {}
     for word, code in declared("walkers").items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Final, Literal, TypeVar, get_args
 
 from walkerlab.config.walkers import Kneed
 from walkerlab.errors import ConfigError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["adm", "cmd", "mjcf"]
 Law = Literal["contact", "functions"]
+Choice = TypeVar("Choice", bound=str)
 CONTACT_LAWS: Final[tuple[Law, ...]] = get_args(Law)
 SLOPES: Final[tuple[Slope, ...]] = get_args(Slope)
 ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
@@ -78,26 +79,25 @@ def export_model(
     return ExportedFiles(files, left_out)
 
 
-def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names.
+def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Choice:
+    """Return the choice that the text of an option names.
 
     Raises ConfigError for an unknown name.
     """
-    for law in CONTACT_LAWS:
-        if text == law:
-            return law
-    raise ConfigError(f"--law {text}: unknown contact law.", f"Choose from {', '.join(CONTACT_LAWS)}.")
+    for choice in choices:
+        if text == choice:
+            return choice
+    raise ConfigError(f"{option} {text}: unknown {what}.", f"Choose from {', '.join(choices)}.")
+
+
+def parse_law(text: str) -> Law:
+    """Return the ADAMS contact law that `text` names, as `choose` does."""
+    return choose(text, CONTACT_LAWS, "--law", "contact law")
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way to express a slope that `text` names.
-
-    Raises ConfigError for an unknown name.
-    """
-    for slope in SLOPES:
-        if text == slope:
-            return slope
-    raise ConfigError(f"--slope {text}: unknown way to express a slope.", f"Choose from {', '.join(SLOPES)}.")
+    """Return the way to express a slope that `text` names, as `choose` does."""
+    return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
 def add_stops(config: Config) -> Config:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import walkerlab
-from walkerlab.config.drives import Hip, push_offs
+from walkerlab.config.drives import LINEAR, Hip, push_offs
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
@@ -167,7 +167,7 @@ class Exported:
         return identifier(self.config.name)
 
     def describe(self, left_out: Iterable[str], commit: str | None, tilted: str) -> Iterator[str]:
-        """Yield the header of an exported file: its origin, what is tilted, the walk in walkerlab, and omissions."""
+        """Yield the header of an exported file: origin, what is tilted, walkerlab's own walk, and omissions."""
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
         yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted {tilted}."
         yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."
@@ -206,6 +206,10 @@ def refuse(config: Config) -> None:
         raise ConfigError(
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
             "Set contact.terrain=checkerboard.",
+        )
+    if config.walker.hip.hinge_law != LINEAR:
+        raise ConfigError(
+            f"The hinge law {config.walker.hip.hinge_law} cannot be exported.", "Set walker.hip.hinge_law=linear."
         )
     if config.contact.terrain == "plane" and not config.ground.even:
         raise ConfigError(

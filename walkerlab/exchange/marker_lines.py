@@ -53,7 +53,7 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Describe the samples at `rows` (samples,) by their numbers in the file and their times."""
+    """Describe the samples where `rows` (samples,) is true by their numbers in the file and their times."""
 
     def spell_times(first: int, last: int) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
@@ -62,7 +62,7 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def spell_rows(rows: NDArray[np.bool_]) -> str:
-    """Describe the samples at `rows` (samples,) of a file by their numbers, which count from 1."""
+    """Describe the samples where `rows` (samples,) is true by their numbers, which count from 1."""
     return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
@@ -93,7 +93,8 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
 
     def uneven(before: Array, between: Array, after: Array) -> Array:
-        return np.asarray(np.sum((between - (1.0 - share) * before - share * after) ** 2, axis=1))
+        away = between - (1.0 - share) * before - share * after
+        return np.asarray(np.vecdot(away, away))
 
     before = apart[:-2]
     between = apart[1:-1]
@@ -207,8 +208,8 @@ def unseen_as_gaps(
     pairs  columns of both ends for each coordinate
     """
     ends = list(zip(*pairs, strict=True))
-    places = [np.clip(np.stack([columns[name] for name in names], axis=1), -HUGE, HUGE) for names in ends]
-    length = np.linalg.norm(places[1] - places[0], axis=1)
+    places = [np.clip([columns[name] for name in names], -HUGE, HUGE) for names in ends]
+    length = np.linalg.norm(places[1] - places[0], axis=0)
     seen = length[np.isfinite(length)]
     gaps = dict(columns)
     unseen = dict[str, str]()
@@ -217,11 +218,11 @@ def unseen_as_gaps(
     usual = float(np.median(seen))
     allowed = max(JUMP * NORMAL * float(np.median(np.abs(seen - usual))), SMALLEST_JUMP * usual)
     for names, place in zip(ends, places, strict=True):
-        alike = np.ptp(place, axis=1) == 0.0
+        alike = np.ptp(place, axis=0) == 0.0
         for first, last in apart_runs(alike, alike):
             alike[first : last + 1] = np.any(np.abs(length[first : last + 1] - usual) > allowed)
         if alike.any():
-            value = ", ".join(f"{each:g}" for each in place[np.argmax(alike)])
+            value = ", ".join(f"{each:g}" for each in place[:, np.argmax(alike)])
             text = f"({value}) is taken for 'not seen'"
             unseen |= dict.fromkeys(names, text)
             gaps |= {name: np.where(alike, np.nan, gaps[name]) for name in names}

@@ -91,56 +91,74 @@ def typical_interval(instants: Sequence[float], time: Array) -> float:
     return float(np.median(np.diff(instants))) if len(instants) > 1 else float(time[-1] - time[0])
 
 
-def squares_around(t: Array, y: Array, instants: Array, degree: int, samples_per_degree: int = 1) -> Array:
-    """Return for each instant the squared residuals (instants,) of polynomials before and after it that meet there.
+def squares_around(
+    parts: Sequence[tuple[Array, Array]], instants: Array, degree: int, samples_per_degree: int = 1
+) -> Array:
+    """Return the squared residuals (parts, instants) of polynomials before and after each instant that meet there.
 
-    t, y                times (samples,), rising, and values (samples, legs)
-    instants            (instants,) rising
+    parts               times (samples,), rising, and values (samples, legs) of each part of a recording
+    instants            (parts, instants) rising along each row
     degree              highest degree of the polynomials
     samples_per_degree  number of samples of a side that it needs for each degree above 1
     """
-    counts = np.searchsorted(t, instants)
-    degrees = np.minimum(degree, 1 + np.stack((counts, t.size - counts)) // samples_per_degree)
-    before = squares_before(t, y, instants, counts, degrees[0])
+    counts = np.array([np.searchsorted(t, row) for (t, _), row in zip(parts, instants, strict=True)])
+    rest = np.array([[t.size] for t, _ in parts]) - counts
+    degrees = np.minimum(degree, 1 + np.stack((counts, rest)) // samples_per_degree)
+    before = squares_before(parts, instants, counts, degrees[0])
     # The fit after an instant is the one before it, with time running backwards.
-    mirrored = squares_before(-t[::-1], y[::-1], -instants[::-1], (t.size - counts)[::-1], degrees[1, ::-1])
-    after = [values[::-1] for values in mirrored]
+    mirrored = [(-t[::-1], y[::-1]) for t, y in parts]
+    after = [
+        values[:, ::-1] for values in squares_before(mirrored, -instants[:, ::-1], rest[:, ::-1], degrees[1, :, ::-1])
+    ]
     # Forcing both sides to meet costs their squared gap over the sum of the variances of its ends.
-    gaps = np.sum((before[1] - after[1]) ** 2, axis=1)
+    gaps = np.sum((before[1] - after[1]) ** 2, axis=2)
     return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
 
 
 def squares_before(
-    t: Array, y: Array, instants: Array, counts: NDArray[np.int64], degrees: NDArray[np.int64]
+    parts: Sequence[tuple[Array, Array]], instants: Array, counts: NDArray[np.int64], degrees: NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
-    """Fit polynomials to the first `counts` samples, for each instant.
+    """Fit polynomials to the first `counts` samples of each part, for each instant.
 
-    Returns the squared residuals (instants,), values at the instants (instants, legs), and the variance (instants,) of
-    such a value if that of the samples is 1.
+    Returns the squared residuals (parts, instants), values at the instants (parts, instants, legs), and the variance
+    (parts, instants) of such a value if that of the samples is 1.
     """
-    end = int(counts.max())
     degree = int(degrees.max())
-    span = np.array([t[0], max(float(t[end - 1]), float(instants.max()))])
-    # Powers would make the normal equations too ill-conditioned for this degree.
-    basis, at = (
-        chebvander(2.0 * (each - span[0]) / (np.ptp(span) or 1.0) - 1.0, degree) for each in (t[:end], instants)
+    spans = np.array(
+        [(t[0], max(t[n - 1], last)) for (t, _), n, last in zip(parts, counts.max(1), instants.max(1), strict=True)]
     )
-    columns = np.concatenate((basis, y[:end]), axis=1)
-    # All instants share these sums, so each one costs only the solution of a few equations.
-    moments = np.cumsum([columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], axis=0)
-    used = (np.arange(degree + 1) <= degrees[:, None]) & (counts[:, None] > 1)
-    square = moments[:, : degree + 1, : degree + 1] * (used[:, :, None] & used[:, None, :])
+    # Powers would make the normal equations too ill-conditioned for this degree.
+    at = chebvander(on_span(instants, spans[:, :1], spans[:, 1:]), degree)
+    # All instants of a part share these sums, so each one costs only the solution of a few equations.
+    moments = np.cumsum(
+        [moments_of(part, span, row, degree) for part, span, row in zip(parts, spans, counts, strict=True)], axis=1
+    )
+    used = (np.arange(degree + 1) <= degrees[..., None]) & (counts[..., None] > 1)
+    square = moments[..., : degree + 1, : degree + 1] * (used[..., :, None] & used[..., None, :])
     # A coefficient that is not used still needs an equation, which makes it zero.
-    square += np.eye(degree + 1) * (~used + RIDGE * counts[:, None])[:, None]
-    right = np.concatenate((moments[:, : degree + 1, degree + 1 :], at[:, :, None]), axis=2) * used[:, :, None]
+    square += np.eye(degree + 1) * (~used + RIDGE * counts[..., None])[..., None]
+    right = np.concatenate((moments[..., : degree + 1, degree + 1 :], at[..., None]), axis=-1) * used[..., None]
     solution = np.linalg.solve(square, right)
-    explained = np.sum(right * solution, axis=1)
-    total = np.trace(moments[:, degree + 1 :, degree + 1 :], axis1=1, axis2=2)
+    explained = np.sum(right * solution, axis=-2)
+    total = np.trace(moments[..., degree + 1 :, degree + 1 :], axis1=-2, axis2=-1)
     fitted = counts > 1
-    squares = np.where(fitted, np.maximum(total - np.sum(explained[:, :-1], axis=1), 0.0), 0.0)
-    values = np.sum(right[:, :, -1:] * solution[:, :, :-1], axis=1)
+    squares = np.where(fitted, np.maximum(total - np.sum(explained[..., :-1], axis=-1), 0.0), 0.0)
+    values = np.sum(right[..., -1:] * solution[..., :-1], axis=-2)
     # A side without a fit can have any value at the instant, so an infinite variance makes the gap free of cost.
-    return squares, values, np.where(fitted, explained[:, -1], np.inf)
+    return squares, values, np.where(fitted, explained[..., -1], np.inf)
+
+
+def on_span(times: Array, first: Array, last: Array) -> Array:
+    """Map times from a span to -1 to 1."""
+    return np.asarray(2.0 * (times - first) / np.where(last > first, last - first, 1.0) - 1.0)
+
+
+def moments_of(part: tuple[Array, Array], span: Array, counts: NDArray[np.int64], degree: int) -> list[Array]:
+    """Return the products of polynomials and values of both legs, summed from each of `counts` samples to the next."""
+    end = int(counts.max())
+    t, y = (each[:end] for each in part)
+    columns = np.concatenate((chebvander(on_span(t, *span), degree), y), axis=1)
+    return [columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])]
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:

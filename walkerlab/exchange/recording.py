@@ -571,14 +571,16 @@ def read_markers(path: Path) -> Recording:
     if not any(map(str.strip, lines[5:])) or not any(markers):
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
     names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
+    tabs = len(names) - 1
     # some programs omit the tabs after the last marker that was seen
-    padded = [line + "\t" * (len(names) - 1 - line.count("\t")) if line.strip() else "" for line in lines]
+    if {line.count("\t") for line in lines[5:]} != {tabs}:
+        lines = [line + "\t" * (tabs - line.count("\t")) if line.strip() else "" for line in lines]
     unit = settings.get("Units")
     by_sports2d = "Sports2D" in lines[0]
     # Sports2D states metres even in files whose coordinates are pixels
     in_pixels = by_sports2d and "_px" in lines[0]
     kind_units = {"time": "s", **({"length": unit} if unit and not in_pixels else {})}
-    table = table_of(path, names, padded, 6, "\t", {}, kind_units)
+    table = table_of(path, names, lines, 6, "\t", {}, kind_units)
     return replace(table, levelled_by="Sports2D" if by_sports2d and not in_pixels else "")
 
 

@@ -8,7 +8,7 @@ is located again for every stretch, because a wrong sample near a strike moves i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -48,7 +48,7 @@ NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle 
 SUSPECT: Final = 0.5  # fraction of the limit above which stretch and strike are searched for together
 SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
 MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-SMALLEST_NORM: Final = 0.05  # smallest squared part of a stretch that polynomials do not follow, in samples
+SMALLEST_NORM: Final = 0.12  # smallest squared part of a stretch that polynomials do not follow, in samples
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
 
 
@@ -72,6 +72,7 @@ class Strike:
     angle: Array
     rows: NDArray[np.int64]  # indices of the samples in the recording
     span_s: tuple[float, float]
+    smooth_instant: float  # s, the instant of the strike in a smooth course
     step_s: float
     at_ends: tuple[bool, bool]  # whether the recording begins and ends with them
 
@@ -87,39 +88,10 @@ class Strike:
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
         return basis, self.angle - basis @ (basis.T @ self.angle)
 
-    def instant(self, costs_at: Callable[[Array], Array], *counts: int) -> float:
-        """Return the instant (s) of the smallest cost. `counts` are numbers of trials, in ever smaller intervals."""
-        begin, end = self.span_s
-        for count in counts:
-            trials = np.linspace(begin, end, count)
-            costs = costs_at(trials)
-            # The next interval, and the parabola at the end, need a trial on each side.
-            best = min(max(int(np.argmin(costs)), 1), count - 2)
-            begin, middle, end = trials[best - 1 : best + 2].tolist()
-        # the vertex of the parabola through the best trials
-        left, least, right = costs[best - 1 : best + 2].tolist()
-        bend = left - 2.0 * least + right
-        move = 0.5 * (left - right) / bend if bend > 0.0 else 0.0
-        return float(middle + min(1.0, max(-1.0, move)) * (end - middle))
-
-    @cached_property
-    def smooth_instant(self) -> float:
-        """Instant (s) of the strike in a smooth course."""
-        return self.instant(self.costs_at, FIRST_TRIALS, *NEXT_TRIALS)
-
-    @property
-    def rough_instant(self) -> float:
-        """Instant (s) of the strike in a smooth course, from fewer trials."""
-        return self.instant(self.costs_at, FIRST_TRIALS)
-
     @cached_property
     def smooth_fit(self) -> tuple[Array, Array]:
         """Basis and residuals of a smooth course."""
         return self.fit(self.smooth_instant)
-
-    def costs_at(self, instants: Array) -> Array:
-        """Return the squared residuals of a smooth course for each instant of the strike."""
-        return squares_around(self.time, self.angle, instants, HIGHEST_DEGREE, SAMPLES_PER_DEGREE)
 
     def scatter(self) -> Array:
         """Return the residuals of the smooth course, scaled up for the part that the fit has followed."""
@@ -135,7 +107,8 @@ class Strike:
             parts = self.fit(at)
             return float(np.sum(parts[1] ** 2)) - self.best_stretch(parts).explained
 
-        at = self.instant(lambda instants: np.array([*map(left, instants.tolist())]), 2 * FIRST_TRIALS, *NEXT_TRIALS)
+        spans = np.array([self.span_s])
+        at = float(find_instants(spans, np.vectorize(left, [float]), 2 * FIRST_TRIALS, *NEXT_TRIALS)[0])
         return self.best_stretch(self.fit(at)), left(at)
 
     def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
@@ -172,6 +145,28 @@ class Strike:
         return 0 if whole and self.at_ends[0] else int(first), self.time.size if whole and self.at_ends[1] else int(end)
 
 
+def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int) -> Array:
+    """Return the instants (spans,) of the smallest costs, in s.
+
+    spans     (spans, 2) s, where to search
+    costs_at  function from instants (spans, trials) to their costs
+    counts    numbers of trials, in ever smaller intervals
+    """
+    begin, end = spans.T
+    each = np.arange(len(spans))
+    for count in counts:
+        trials = np.linspace(begin, end, count, axis=1)
+        costs = costs_at(trials)
+        # The next interval, and the parabola at the end, need a trial on each side.
+        best = np.clip(np.argmin(costs, axis=1), 1, count - 2)
+        begin, middle, end = (trials[each, best + k] for k in (-1, 0, 1))
+    # the vertex of the parabola through the best trials
+    left, least, right = (costs[each, best + k] for k in (-1, 0, 1))
+    bend = left - 2.0 * least + right
+    move = 0.5 * (left - right) / np.where(bend > 0.0, bend, np.inf)
+    return np.asarray(middle + np.clip(move, -1.0, 1.0) * (end - middle))
+
+
 def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the spans (spans, 2) that begin at these samples and have a length."""
     return np.stack((first, first + length), axis=1)
@@ -182,8 +177,9 @@ def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Ar
 
     sums  cumulative sums of the fit's orthonormal basis and of its residuals
     """
-    inside, share = (part[spans[:, 1]] - part[spans[:, 0]] for part in sums)
-    return np.diff(spans, axis=1)[:, 0] - np.vecdot(inside, inside), share
+    first, end = spans.T
+    inside, share = (part.take(end, axis=0) - part.take(first, axis=0) for part in sums)
+    return end - first - np.vecdot(inside, inside), share
 
 
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
@@ -206,7 +202,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
         return []
     found = find_leaps(time, angle, LONGEST * course_of(time, angle).step_s)
     course = course_of(time, angle, found)
-    strikes = [course.strike(index) for index in range(len(course.spans))]
+    strikes = course.strikes(range(len(course.spans)))
     sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
     # Polynomials through sparse samples would follow errors, too.
     if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
@@ -245,7 +241,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch besides others, or None if it is within the limit."""
-        strike = course.remove_stretches(others).strike(index)
+        strike = course.remove_stretches(others).strikes([index])[0]
         if strike.best_stretch(strike.smooth_fit).explained <= SUSPECT * limit:
             return None
         stretch, left = strike.best_with_strike()
@@ -288,32 +284,53 @@ class Course:
                 kept &= (self.rows < stretch.first) | (self.rows >= stretch.end)
         return replace(self, time=self.time[kept], angle=angle[kept], rows=self.rows[kept])
 
-    def strike(self, index: int) -> Strike:
-        """Return the steps around the heel strike in a span."""
+    def strikes(self, indices: Sequence[int]) -> list[Strike]:
+        """Return the steps around the heel strikes in some spans."""
+        self.guess(indices)
+        ends = [self.ends_around(index) for index in indices]
+        slices = [self.slice_of(first, last) for first, last, _ in ends]
+        spans = [span for *_, span in ends]
+        instants = self.smooth_instants(slices, spans, FIRST_TRIALS, *NEXT_TRIALS)
+        return [
+            Strike(
+                self.time[near], self.angle[near], self.rows[near], span, at, self.step_s,
+                (near.start == 0, near.stop == self.time.size),
+            )
+            for near, span, at in zip(slices, spans, instants, strict=True)
+        ]  # fmt: skip
+
+    def ends_around(self, index: int) -> tuple[float, float, tuple[float, float]]:
+        """Return the beginning and end (s) of the steps around a strike, and the span of time in which to search it."""
         begin, end = self.spans[index]
-        at = self.guess(index)
-        margin = MARGIN * self.step_s
+        at = self.guesses[index]
         farthest = MAX_FIT_TIME * self.step_s
-        first = max(self.guess(index - 1) + margin, at - farthest) if index else float(self.time[0])
+        first = max(self.guesses[index - 1] + MARGIN * self.step_s, at - farthest) if index else float(self.time[0])
         following = index + 1 < len(self.spans)
-        last = min(self.guess(index + 1) - margin, at + farthest) if following else float(self.time[-1])
-        return self.part(
-            first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
-        )
+        last = min(self.guesses[index + 1] - MARGIN * self.step_s, at + farthest) if following else float(self.time[-1])
+        return first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
 
-    def guess(self, index: int) -> float:
-        """Return a first guess of the time at which rates jump within a span."""
-        if index not in self.guesses:
-            begin, end = self.spans[index]
-            half = 0.5 * self.step_s
-            self.guesses[index] = self.part(begin - half, end + half, (begin, end)).rough_instant
-        return self.guesses[index]
+    def guess(self, indices: Iterable[int]) -> None:
+        """Add first guesses of the times at which rates jump within some spans and the spans beside them."""
+        nearby = {near for index in indices for near in (index - 1, index, index + 1)}
+        new = sorted(nearby.intersection(range(len(self.spans))) - self.guesses.keys())
+        spans = [self.spans[index] for index in new]
+        half = 0.5 * self.step_s
+        slices = [self.slice_of(begin - half, end + half) for begin, end in spans]
+        self.guesses.update(zip(new, self.smooth_instants(slices, spans, FIRST_TRIALS), strict=True))
 
-    def part(self, first_s: float, last_s: float, span_s: tuple[float, float]) -> Strike:
-        first, end = int(np.searchsorted(self.time, first_s)), int(np.searchsorted(self.time, last_s, "right"))
-        near = slice(first, end)
-        at_ends = first == 0, end == self.time.size
-        return Strike(self.time[near], self.angle[near], self.rows[near], span_s, self.step_s, at_ends)
+    def smooth_instants(
+        self, slices: Sequence[slice], spans: Sequence[tuple[float, float]], *counts: int
+    ) -> list[float]:
+        """Return the instants (s) of strikes in a smooth course through some samples."""
+        parts = [(self.time[near], self.angle[near]) for near in slices]
+
+        def costs_at(instants: Array) -> Array:
+            return squares_around(parts, instants, HIGHEST_DEGREE, SAMPLES_PER_DEGREE)
+
+        return find_instants(np.array(spans), costs_at, *counts).tolist() if parts else []
+
+    def slice_of(self, first_s: float, last_s: float) -> slice:
+        return slice(int(np.searchsorted(self.time, first_s)), int(np.searchsorted(self.time, last_s, "right")))
 
 
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:

@@ -8,8 +8,7 @@ the angles around the fit gives the standard error of that time.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -74,6 +73,11 @@ class Touch:
     fit: StrikeFit  # in s
 
 
+Problem = tuple[Array, Array, float, Sequence[int]]
+"""Times (samples,) and angles (samples, 2), the instant at which polynomials meet, and their degrees (rising)."""
+Fits = dict[int, StrikeFit]  # by degree
+
+
 def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     """Find the heel strikes in the angles of both legs.
 
@@ -85,7 +89,7 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     # The period is not known yet, so at first all consecutive crossings of a leg count as one strike.
     period = typical_interval([crossing for crossing, _ in merge_repeats(crossings, np.inf)], time)
     merged = merge_repeats(crossings, SHORTEST * period)
-    located = [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in merged]
+    located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in merged])
     # A fit may move a crossing among the first samples to before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
     first = touch_at_start(time, angle, height, period)
@@ -140,18 +144,24 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
         return None
     rows = time - begin <= MAX_FIT_TIME * period
     t, y = time[rows] - begin, angle[rows]
-    fits = fit_degrees(t, y, 0.0)
+    fits = fit_degrees([(t, y, 0.0, ALL_DEGREES)])[0]
     degree = best_degree(fits)
     # The best degree balances bias and scatter. One degree more keeps the bias within the standard error.
     fit = fits.get(degree + 1) or fits.get(degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
-    return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
+    if touch is None or touch.error_s >= PRECISE_S or off > ERRORS * touch.error_s:
+        return None
+    # A strike just before the recording looks like one at its first sample, as far off as the fit says.
+    return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
 
 
-def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch | None:
-    """Locate the heel strike near a crossing by a fit, or return None if there are too few samples, or the foot does
-    not fall.
+def locate_touch(
+    time: Array, angle: Array, height: Height, near: float, leg: int, period: float
+) -> Generator[Problem, Fits, Touch | None]:
+    """Locate the heel strike near a crossing by fits, which `fit_together` makes for all strikes at once.
+
+    Returns None if there are too few samples, or the foot does not fall.
     """
     t, y = samples_near(time, angle, near, period)
     farthest = 0.5 * float(np.abs(t).max())
@@ -162,7 +172,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
         choosing = iteration < DEGREE_ITERATIONS
-        fits = fit_degrees(t, y, at, ALL_DEGREES if choosing else (degree, degree + 1))
+        fits = yield t, y, at, ALL_DEGREES if choosing else (degree, degree + 1)
         degree = best_degree(fits) if choosing else degree
         fit = fits.get(degree)
         if fit is None or len(fit.rates) < SIDES:
@@ -180,6 +190,21 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
         return None
     return replace(touch, error_s=float(np.hypot(touch.error_s, correction)))
+
+
+def fit_together(searches: Sequence[Generator[Problem, Fits, Touch | None]]) -> list[Touch | None]:
+    """Run searches in step, making the fits that they wait for together, and return their results."""
+    results: list[Touch | None] = [None] * len(searches)
+    problems = {index: next(search) for index, search in enumerate(searches)}
+    while problems:
+        fits = dict(zip(problems, fit_degrees(list(problems.values())), strict=True))
+        problems = {}
+        for index, answer in fits.items():
+            try:
+                problems[index] = searches[index].send(answer)
+            except StopIteration as end:
+                results[index] = end.value
+    return results
 
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
@@ -208,7 +233,7 @@ def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
 
-def best_degree(fits: Mapping[int, StrikeFit]) -> int:
+def best_degree(fits: Fits) -> int:
     """Return the degree of the polynomials that describe the samples best."""
     return min((degree for degree in DEGREES if degree in fits), key=lambda d: fits[d].criterion, default=DEGREES[0])
 
@@ -221,60 +246,75 @@ def add_bias(fit: StrikeFit, narrow: StrikeFit | None, wide: StrikeFit | None) -
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 
 
-def fit_degrees(t: Array, y: Array, at: float, degrees: Iterable[int] = ALL_DEGREES) -> dict[int, StrikeFit]:
+def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
     """Fit polynomials of each degree (rising) before and after an instant, which meet there.
 
     A side with too few samples for a degree, for example where a recording begins just before a strike, is not fitted,
     because it would force a low degree on the other side. A degree for which both sides have too few samples is absent.
     """
-    both = {"before": t < at, "after": t >= at}
-    counts = {name: int(np.sum(side)) for name, side in both.items()}
-    fits = dict[int, StrikeFit]()
-    by_sides: dict[tuple[str, ...], list[int]] = {}
-    for degree in degrees:
-        fewest = max(degree + 1, LOPSIDED * max(counts.values()))
-        names = tuple(name for name, count in counts.items() if count >= fewest)
-        if sum(counts[name] for name in names) > 1 + degree * len(names):
-            by_sides.setdefault(names, []).append(degree)
-    by_sides.pop((), None)
-    for names, alike in by_sides.items():
-        used = np.any([both[name] for name in names], axis=0)
-        fits |= fit_sides(t[used] - at, y[used], {name: both[name][used] for name in names}, alike)
+    fits: list[Fits] = [{} for _ in problems]
+    alike: dict[tuple[tuple[str, ...], tuple[int, ...], int], list[tuple[int, Array, Array]]] = {}
+    for index, (t, y, at, degrees) in enumerate(problems):
+        split = int(np.searchsorted(t, at))
+        counts = {"before": split, "after": t.size - split}
+        by_sides: dict[tuple[str, ...], tuple[int, ...]] = {}
+        for degree in degrees:
+            fewest = max(degree + 1, LOPSIDED * max(counts.values()))
+            names = tuple(name for name, count in counts.items() if count >= fewest)
+            if sum(counts[name] for name in names) > 1 + degree * len(names):
+                by_sides[names] = (*by_sides.get(names, ()), degree)
+        for names, of_sides in by_sides.items():
+            used = slice(0 if "before" in names else split, t.size if "after" in names else split)
+            # Fits are made together if they have about as many samples.
+            key = names, of_sides, (used.stop - used.start).bit_length()
+            alike.setdefault(key, []).append((index, t[used] - at, y[used]))
+    for (names, of_sides, _), group in alike.items():
+        indices, times, values = zip(*group, strict=True)
+        for index, fit in zip(indices, fit_sides(times, values, names, of_sides), strict=True):
+            fits[index] |= fit
     return fits
 
 
 def fit_sides(
-    t: Array, y: Array, sides: Mapping[str, NDArray[np.bool_]], degrees: Sequence[int]
-) -> dict[int, StrikeFit]:
-    """Fit polynomials of each degree, on these sides of the time 0, which meet there.
+    times: Sequence[Array], values: Sequence[Array], sides: Sequence[str], degrees: Sequence[int]
+) -> list[Fits]:
+    """Fit polynomials of each degree, on these sides of the time 0, which meet there, to each of some problems.
 
     Columns are in the order of the degrees, so that one factorisation serves all of them.
     """
+    sizes = np.array([each.size for each in times])
+    filled = np.arange(sizes.max()) < sizes[:, None]
+    # Rows of zeros fill up the problems with fewer samples.
+    t = np.zeros(filled.shape)
+    y = np.zeros((*filled.shape, 2))
+    t[filled] = np.concatenate(times)
+    y[filled] = np.concatenate(values)
     # Powers of times in seconds would differ by many orders of magnitude.
-    scale = float(np.ptp(t))
-    powers = (t / scale)[:, None] ** np.arange(1, degrees[-1] + 1)
-    by_side = np.stack([side[:, None] * powers for side in sides.values()], axis=2)
-    basis = np.concatenate((np.ones((t.size, 1)), by_side.reshape(t.size, -1)), axis=1)
+    scale = np.array([np.ptp(each) for each in times])[:, None]
+    parts = [np.where(t < 0.0 if side == "before" else t >= 0.0, t / scale, 0.0) for side in sides]
+    powers = np.multiply.accumulate(np.stack([np.stack(parts, axis=-1)] * degrees[-1], axis=2), axis=2)
+    basis = np.concatenate((filled[..., None], powers.reshape(*filled.shape, -1)), axis=2)
     orthonormal, triangle = np.linalg.qr(basis)
     inverse = np.linalg.inv(triangle)
-    shares = orthonormal.T @ y
-    left = float(np.sum((y - orthonormal @ shares) ** 2)) + SMALLEST
+    shares = orthonormal.mT @ y
+    left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + SMALLEST
     # sums over the columns that a lower degree lacks, and over those that it has
-    missed = np.append(np.cumsum(np.sum(shares**2, axis=1)[::-1])[::-1], 0.0).tolist()
-    variances = np.cumsum(inverse[0] ** 2).tolist()
-    count = t.size
-    fits = {}
+    missed = np.pad(np.cumsum(np.sum(shares**2, axis=2)[:, ::-1], axis=1)[:, ::-1], ((0, 0), (0, 1)))
+    variances = np.cumsum(inverse[:, 0] ** 2, axis=1)
+    fits: list[Fits] = [{} for _ in times]
     for degree in degrees:
         columns = 1 + degree * len(sides)
-        coefficients = inverse[: 1 + len(sides), :columns] @ shares[:columns]
-        squares = left + missed[columns]
-        freedoms = 2 * (count - columns)
-        rates = {name: coefficients[1 + k] / scale for k, name in enumerate(sides)}
+        coefficients = inverse[:, : 1 + len(sides), :columns] @ shares[:, :columns]
+        squares = left + missed[:, columns]
+        freedoms = 2 * (sizes - columns)
         # standard deviation of Student's t, because few values determine the scatter only roughly
-        deviation = math.sqrt(squares / max(freedoms - 2, 1) * variances[columns - 1])
-        penalty = 2 * columns * math.log(2 * count) * count / (count - columns)
-        criterion = 2 * count * math.log(squares) + penalty
-        fits[degree] = StrikeFit(coefficients[0], rates, squares, freedoms, deviation, criterion)
+        deviations = np.sqrt(squares / np.maximum(freedoms - 2, 1) * variances[:, columns - 1])
+        penalties = 2 * columns * np.log(2 * sizes) * sizes / (sizes - columns)
+        criteria = 2 * sizes * np.log(squares) + penalties
+        rates = coefficients[:, 1:] / scale[..., None]
+        rows = zip(*(each.tolist() for each in (squares, freedoms, deviations, criteria)), strict=True)
+        for fit, angle, of_sides, row in zip(fits, coefficients[:, 0], rates, rows, strict=True):
+            fit[degree] = StrikeFit(angle, dict(zip(sides, of_sides, strict=True)), *row)
     return fits
 
 
@@ -291,28 +331,25 @@ def angles_at_jumps(
     """
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), MAX_FIT_TIME * period)
     inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
-    near = [(touch.time_s, rows_within(time, touch.time_s, half)) for touch in inside]
+    parts = [
+        (time[rows] - touch.time_s, angle[rows]) for touch in inside for rows in [rows_within(time, touch.time_s, half)]
+    ]
 
     shifts = np.linspace(-0.5, 0.5, SHIFTS) * half
     # A shift is tried only if it leaves enough samples on both sides of every strike.
-    for instant, rows in near:
-        after = np.searchsorted(time[rows] - instant, shifts)
-        fewer, more = np.sort((after, time[rows].size - after), axis=0)
+    for t, _ in parts:
+        after = np.searchsorted(t, shifts)
+        fewer, more = np.sort((after, t.size - after), axis=0)
         shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, LOPSIDED * more)]
     # Shifts are judged against the strikes as they were found.
-    if not near or not np.any(shifts == 0.0):
+    if not parts or not np.any(shifts == 0.0):
         return None
-    squares = np.sum(
-        [squares_around(time[rows] - instant, angle[rows], shifts, JUMP_DEGREE) for instant, rows in near], axis=0
-    )
+    squares = np.sum(squares_around(parts, np.tile(shifts, (len(parts), 1)), JUMP_DEGREE), axis=0)
     index = int(np.argmin(squares))
     least = float(squares[index])
 
     def fits_at(shift: float) -> list[StrikeFit]:
-        fits = (
-            fit_degrees(time[rows] - instant, angle[rows], shift, [JUMP_DEGREE]).get(JUMP_DEGREE)
-            for instant, rows in near
-        )
+        fits = (each.get(JUMP_DEGREE) for each in fit_degrees([(t, y, shift, [JUMP_DEGREE]) for t, y in parts]))
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
     variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
@@ -323,6 +360,6 @@ def angles_at_jumps(
     before, after = squares[[index - 1, index + 1]].tolist()
     best = float(shifts[index] + 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[1] - shifts[0]))
     fits = fits_at(best)
-    if abs(best) <= PRECISE_S or len(fits) < len(near):
+    if abs(best) <= PRECISE_S or len(fits) < len(parts):
         return None
     return best, np.array([fit.angle for fit in fits]), np.array([touch.leg for touch in inside])

@@ -203,8 +203,9 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
     columns = np.column_stack((energy, turning))
     # Heel strikes lose energy, so only changes within a step count.
-    for number in range(int(steps.step[-1]) + 1):
-        columns[steps.step == number] -= np.mean(columns[steps.step == number], axis=0)
+    sizes = np.bincount(steps.step)
+    means = np.add.reduceat(columns, np.cumsum(sizes) - sizes) / sizes[:, None]
+    columns -= means[steps.step]
     # A tilt turns gravity. The two coefficients are its components, so together they give its size.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
@@ -474,9 +475,9 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
     columns  (samples, 4) angles and velocities, or (samples, 2) angles, from which a spline gives the velocities
     """
-    near = (time >= begin) & (time <= end)
-    spline = spline_through(time[near], columns[near])
-    inside = np.flatnonzero((time > begin) & (time < end))
+    first, after = np.searchsorted(time, begin), np.searchsorted(time, end, "right")
+    spline = spline_through(time[first:after], columns[first:after])
+    inside = np.arange(np.searchsorted(time, begin, "right"), np.searchsorted(time, end))
     inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)

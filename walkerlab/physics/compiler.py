@@ -11,7 +11,7 @@ import importlib
 import linecache
 import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -147,8 +147,17 @@ def strip_bitcode(path: Path) -> bytes:
     return pack(((name, kind, (machine_code, binding.parse_assembly(symbols).as_bitcode())), *rest))
 
 
+def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
+    """Yield the classes that fields of a record type name as "module/class"."""
+    # NumPy's records cannot be read by others if a field's name has a colon.
+    for module, slash, name in (field.partition("/") for field in fields):
+        if slash:
+            yield getattr(importlib.import_module(module), name)
+
+
 def classes_in(kind: Any) -> Iterator[type]:
-    """Yield the NamedTuple classes in a type of numba, or in a tuple of types."""
+    """Yield the NamedTuple classes in a type of numba or in a tuple of types, and those that records name."""
+    yield from classes_named_by(getattr(getattr(kind, "dtype", kind), "fields", ()))
     if hasattr(kind, "instance_class"):
         yield kind.instance_class
     held = kind.held if hasattr(kind, "held") else kind

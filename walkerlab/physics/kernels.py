@@ -3,26 +3,19 @@
 import functools
 import hashlib
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
 from llvmlite import ir
+from numba import extending
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.extending import (
-    NativeValue,
-    lower_builtin,
-    lower_getattr_generic,
-    models,
-    register_model,
-    typeof_impl,
-    unbox,
-)
 from numba.np.arrayobj import make_array, populate_array
 
 from walkerlab.physics.compiler import FLAGS, Kernel, bodies
 from walkerlab.physics.compiler import PART_FLAGS as PART_FLAGS
+from walkerlab.physics.compiler import classes_named_by as classes_named_by
 
 # inlined, because passing lanes through memory costs as much as the arithmetic on them
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
@@ -135,6 +128,16 @@ def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     return chosen
 
 
+class LawKind(NamedTuple):
+    """Force laws that a config key can select."""
+
+    key: str  # last part of the key
+    laws: dict[str, Any]  # built-in classes by word
+    protocol: type
+    required: tuple[ByType, ...]  # functions of which each law needs a case
+    together: tuple[ByType, ...] = ()  # functions of which a law has cases of all or of none
+
+
 class ByAddress(types.Type):
     """Numba's type of a NamedTuple that is passed by its address: see `pass_by_reference`."""
 
@@ -155,15 +158,15 @@ def pass_by_reference(chosen: C) -> C:
     # packing and unpacking them.
 
     def reference(value: Any, purpose: Any) -> ByAddress:
-        fields = [typeof_impl(field, purpose) for field in value]
+        fields = [extending.typeof_impl(field, purpose) for field in value]
         return ByAddress(types.containers.BaseTuple.from_types(fields, chosen))
 
-    typeof_impl.register(chosen)(reference)
+    extending.typeof_impl.register(chosen)(reference)
     return chosen
 
 
-@register_model(ByAddress)
-class _ReferenceModel(models.PrimitiveModel):  # type: ignore[misc]
+@extending.register_model(ByAddress)
+class _ReferenceModel(extending.models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: ByAddress) -> None:
         super().__init__(manager, kind, manager.lookup(kind.held).get_value_type().as_pointer())
 
@@ -176,15 +179,15 @@ class _ReferencedFields(AttributeTemplate):  # type: ignore[misc]
         return kind.held[kind.held.fields.index(name)] if name in kind.held.fields else None
 
 
-@lower_getattr_generic(ByAddress)  # type: ignore[untyped-decorator]
+@extending.lower_getattr_generic(ByAddress)  # type: ignore[untyped-decorator]
 def _load_field(_context: Any, builder: Any, kind: ByAddress, value: Any, name: str) -> Any:
     return builder.load(cgutils.gep_inbounds(builder, value, 0, kind.held.fields.index(name)))
 
 
-@unbox(ByAddress)  # type: ignore[untyped-decorator]
+@extending.unbox(ByAddress)  # type: ignore[untyped-decorator]
 def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
     held = c.unbox(kind.held, value)
-    return NativeValue(cgutils.alloca_once_value(c.builder, held.value), held.is_error, held.cleanup)
+    return extending.NativeValue(cgutils.alloca_once_value(c.builder, held.value), held.is_error, held.cleanup)
 
 
 def vector(like: Any) -> Any:
@@ -243,7 +246,7 @@ def _stack_memory(function: Callable[..., Any], dimensions: int) -> None:
         )
         return array._getvalue()
 
-    lower_builtin(function, types.Any)(generate)
+    extending.lower_builtin(function, types.Any)(generate)
 
 
 _stack_memory(vector, 1)

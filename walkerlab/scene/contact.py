@@ -1,89 +1,44 @@
-"""Build the contact model of a config, with only the parts that the config needs, and the laws of its ground."""
+"""Build the contact model of a config, with only the parts that the config needs, the laws of its ground, and starts
+with scaled velocities, for maps and basins.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.reads import ContactConfig, GroundConfig
 from walkerlab.config.walkers import AssembledWalker, Kneed
-from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.extensions import declared, load
-from walkerlab.physics.ground.compliant import KneeRules, contact_walker
-from walkerlab.physics.ground.friction import (
-    FRICTION_LAWS,
-    FrictionLaw,
-    friction_coefficient,
-    sample_switching,
-    switching_count,
-)
-from walkerlab.physics.ground.normal_force import (
-    NORMAL_LAWS,
-    Impact,
-    NormalLaw,
-    elastic_energy,
-    normal_force,
-    release_function,
-)
+from walkerlab.errors import NoAnswer
+from walkerlab.physics.ground.compliant import ContactDrives, KneeRules, contact_walker
+from walkerlab.physics.ground.friction import FRICTION_LAWS
+from walkerlab.physics.ground.normal_force import NORMAL_LAWS, Impact
 from walkerlab.physics.ground.resting import RestingFoot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
-from walkerlab.physics.ground.walker import ContactWalker, changed_forms, floating_state
+from walkerlab.physics.ground.walker import floating_state
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround
+from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.mechanics.parts import Assembly
 from walkerlab.physics.mechanics.rigid import group_bodies
+from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between_touches
+from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
+from walkerlab.scene.laws import ground_law, hinge_law_of
 from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
 from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
-
-
-class LawKind(NamedTuple):
-    """Laws between which a key of the contact block chooses."""
-
-    laws: dict[str, Any]  # classes by word
-    protocol: type
-    required: tuple[Any, ...]  # functions of which each law needs a case
-    together: tuple[Any, ...] = ()  # functions of which a law has cases of all or of none
-
-
-LAW_KINDS: Final = {
-    "normal_force": LawKind(NORMAL_LAWS, NormalLaw, (normal_force, release_function, elastic_energy)),
-    "friction": LawKind(FRICTION_LAWS, FrictionLaw, (friction_coefficient,), (switching_count, sample_switching)),
-}
-
-
-def create_law(key: str, word: str, contact: Any) -> Any:
-    """Create the law that a contact block in SI names under a key.
-
-    Raises TypeError if its class is incomplete.
-    """
-    law = LAW_KINDS[key].laws[word]
-    missing = missing_members(law, LAW_KINDS[key])
-    if missing:
-        kind = key.replace("_", "-")
-        raise TypeError(f"the {kind} law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
-    return law.from_contact(contact)
-
-
-def missing_members(law: type, kind: LawKind) -> list[str]:
-    """List what a law's class lacks: members of its protocol, and registered cases of functions."""
-    members = [name for name in vars(kind.protocol) if not name.startswith("_")]
-    missing = [name for name in members if not hasattr(law, name)]
-    # A law with one of these functions needs the others: events that are counted must also be sampled.
-    together = kind.together if any(law in function for function in kind.together) else ()
-    cases = [function for function in (*kind.required, *together) if law not in function]
-    return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]
 
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
@@ -131,8 +86,8 @@ def contact_scene(
     rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
-    passive = contact_walker(assembly, *laws, gravity, config.slope_rad, rules)
-    walker = apply_drives(passive, config)
+    drives = contact_drives(config)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
     leg = config.walker.leg_length_m
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -170,11 +125,13 @@ def scene_on_pads(
     return contact_scene(config, rigid_step, pitch, asymmetry)
 
 
-def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
+def contact_drives(config: ContactConfig) -> ContactDrives:
+    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
-    return changed_forms(walker, **drives.shared, **(pulse if any(drives.push_offs) else {}), **knees)
+    fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
+    return ContactDrives(law, fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -243,20 +200,7 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
     Raises ConfigError if a law that an extension added is incomplete.
     """
     si = contact.to_si()
-    normal, friction = (ground_law(key, getattr(contact, key), si) for key in LAW_KINDS)
-    return normal, friction
-
-
-def ground_law(key: str, word: str, si: Any) -> Any:
-    added = declared(key)
-    try:
-        if word in added:
-            LAW_KINDS[key].laws[word] = load(added[word])
-        return create_law(key, word, si)
-    except (TypeError, ImportError, AttributeError) as error:
-        protocol = LAW_KINDS[key].protocol
-        advice = f"{protocol.__name__} in {protocol.__module__} lists the members of a law."
-        raise ConfigError(f"{error}.", advice) from error
+    return ground_law(NORMAL_LAWS, si), ground_law(FRICTION_LAWS, si)
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
@@ -295,3 +239,37 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
         "pitch_m": scene.pitch_m,
         "friction": scene.walker.friction.describe(),
     }
+
+
+# Except at boundaries between outcomes, these tolerances give the same map as the config's.
+MAP_RTOL = 1e-4
+MAP_ATOL = 1e-6
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
+
+
+def build_scaled_starts(
+    scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
+) -> scaled_starts.ScaledStarts:
+    """Build starts with scaled velocities from a rigid start. If the contact gait is known, walks must settle on it."""
+    gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
+
+    def start(swing: float, stance: float) -> State:
+        return start_state(scene, scale_rates(rigid, state, swing, stance))
+
+    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, gait)
+    return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
+
+
+def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
+    """Return period (s) and length (m) of each step of a gait, which is a single step for equal legs."""
+    if len(gait.steps) == 1:
+        return ((gait.period_s, gait.step.length_m),)
+    return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))
+
+
+def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
+    """Return the starts with the solver settings of a map.
+
+    evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
+    """
+    return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

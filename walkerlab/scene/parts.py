@@ -111,7 +111,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     Raises ConfigError for inconsistent parts.
     """
     parts = legs_of(walker, rigid)
-    other = walkers.second_leg_of(walker)
+    other = walker.second
     parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
@@ -177,12 +177,12 @@ def drive_parameters(config: RigidConfig) -> Drives:
     dampings = knee_dampings(config.walker)
     # a knee is only damped
     knees = tuple((0.0, damping, 0.0) for damping in dampings) if any(dampings) else ()
-    return Drives(tuple(dict(config.walker.hip).values()), push_offs(config.push_off), knees)
+    return Drives(config.walker.hip.parameters, push_offs(config.push_off), knees)
 
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
     """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
-    knees = (getattr(each, "knee", None) for each in (walker, walkers.second_leg_of(walker)))
+    knees = (getattr(each, "knee", None) for each in (walker, walker.second))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second
 

@@ -21,6 +21,7 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pa
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene import parts
+from walkerlab.scene.laws import hinge_law_of
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
@@ -76,8 +77,9 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
-    passive = change_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
-    return replace_equations(add_drives(passive, config), equations or config.equations)
+    level = level_walker(config.walker, config.gravity_m_s2)
+    driven = add_drives(change_slope(level, config.slope_rad), config)
+    return replace_equations(driven, equations or config.equations)
 
 
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
@@ -100,10 +102,10 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
     Raises ConfigError if the parts are not a valid walker.
     """
+    law = hinge_law_of(walker)
+    assembly = parts.assembly_of(walker, rigid=True)
     try:
-        return rigid_on_level_ground(
-            parts.assembly_of(walker, rigid=True), gravity, parts.knee_locked_at_strike(walker)
-        )
+        return rigid_on_level_ground(assembly, gravity, parts.knee_locked_at_strike(walker), law)
     except ValueError as error:
         raise ConfigError(f"walker: {error}", parts.PARTS_DOCS) from None
 

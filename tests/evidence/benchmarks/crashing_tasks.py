@@ -1,4 +1,4 @@
-"""Tasks that end as engines may."""
+"""Tasks that crash, fail or never end, as engines may."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""The paper's compass and the kneed walker on their ground, as engines get them."""
+"""The paper's compass and the kneed walker on their ground, in the form that engines get."""
 
 from functools import cache
 from pathlib import Path
@@ -34,7 +34,7 @@ ONE_KNEE_GAIT = (
 
 @cache
 def one_knee():
-    """Leg 1 has a knee, leg 2 has none."""
+    """The walker whose leg 1 has a knee and whose leg 2 has none."""
     config = load(Path("one-knee"), (ONE_KNEE_GROUND,)).config
     return supported_scene(config, 0.42478605569498096, ONE_KNEE_GAIT, 0.05797768479511639)
 

@@ -1,4 +1,4 @@
-"""Error against run time on the rigid scene, a few methods: what the rows say, and what is computed from them."""
+"""Tests of the stage `accuracy`: errors and run times of a few methods on the rigid scene, and its conclusions."""
 
 from dataclasses import replace
 
@@ -19,16 +19,15 @@ from walkerlab.evidence.benchmarks.accuracy import (
     omitted_tolerances,
     summarise,
 )
-from walkerlab.evidence.benchmarks.trials import (
-    USER_SCRIPT,
+from walkerlab.evidence.benchmarks.references import (
     End,
     Reference,
-    RigidTrial,
-    TrialRun,
     WalkEndsError,
     first_end,
     reference_for,
+    walk_by_taylor,
 )
+from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.store.content import rows_group
@@ -67,6 +66,11 @@ def test_reference_without_taylor_series_also_has_two_methods():
     reference = reference_for(replace(TRIAL, compass=None, steps=1))
     assert {reference.first.method, reference.second.method} == {"dop853", "radau5"}
     assert reference.agreement < 1e-10
+
+
+def test_taylor_walk_whose_state_overflows_has_no_end():
+    pytest.importorskip("heyoka")
+    assert walk_by_taylor(TRIAL.compass, (-0.2, 0.17, 0.0, 1e200), 1) is None
 
 
 def test_every_method_converges_to_the_reference(rows):
@@ -115,7 +119,7 @@ def test_error_below_the_uncertainty_of_the_reference_is_marked():
     assert [make_row(climbed, run, unsure).within_reference for run in runs] == [False, True]
 
 
-def test_exhausted_budget_is_shown_and_stops_tightening(reference, monkeypatch):
+def test_exhausted_budget_is_shown_and_ends_the_series_of_tolerances(reference, monkeypatch):
     monkeypatch.setattr(accuracy, "RUN_BUDGET", 500)
     one = ascend(TRIAL, "radau5", Checkpoint(None, ""))
     rows = [make_row(one, run, reference) for run in one.runs]
@@ -126,7 +130,7 @@ def test_exhausted_budget_is_shown_and_stops_tightening(reference, monkeypatch):
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
 
-def test_library_series_stops_at_the_first_exhausted_budget(reference, monkeypatch):
+def test_series_of_a_library_method_ends_at_its_first_exhausted_budget(reference, monkeypatch):
     sizes = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
     monkeypatch.setattr(accuracy, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
     monkeypatch.setattr(accuracy, "LAST_RUN_SIZE", sizes[1] + 1)
@@ -225,7 +229,7 @@ def test_best_method_is_the_fastest_that_is_accurate_enough():
     assert best_methods(MADE, "contact") == {}
 
 
-def test_conclusion_compares_with_the_best_library():
+def test_conclusion_compares_the_best_method_with_the_best_library():
     said = conclusion(MADE, "rigid")
     assert "at 1e-06, radau5 is fastest with 2e+03 ms, 4 times faster than scipy-bdf" in said
     assert "no method reaches" not in said

@@ -1,4 +1,4 @@
-"""Every engine that is installed: its swing converges to ours, its contact carries what it should, our law is ours."""
+"""Check every installed engine: its swing converges to ours, and both contact laws carry the right load."""
 
 import importlib
 from functools import cache
@@ -58,15 +58,15 @@ def test_energy_drift_is_bounded_by_the_swing_error(engine):
         assert drift < 25.0 * error + 1e-12, name
 
 
-def test_ball_rests_at_the_depth_of_the_law(engine):
+def test_ball_rests_at_the_depth_given_by_the_contact_law(engine):
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         assert task.penetration_at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
 
 
-def test_block_creeps_and_slides_according_to_the_law(engine):
-    """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
+def test_block_creeps_and_slides_according_to_the_friction_law(engine):
+    """Compare with closed forms. A convex friction cone, which lifts a sliding block, has another one."""
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         bench = TuningTask(engine.name, contact, target, 1e-4, 1.5)
@@ -94,7 +94,7 @@ def test_mujoco_gives_both_feet_of_a_kneed_walker_the_same_spring(locked):
 
 @pytest.mark.parametrize(("walker", "until"), [(kneed, 0.4), (one_knee, 0.6)])
 def test_knee_locks_in_an_engine_as_in_walkerlab(engine, walker, until):
-    """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
+    """Compare the engine's own swing with a free knee, its lock, and its own swing with one body less."""
     scene = walker()
     truth = simulate(scene, "radau5", 1e-10, 1, until)
     name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
@@ -119,7 +119,10 @@ DRIVES = {
 
 @pytest.mark.parametrize("drives", [*DRIVES, "legs that differ"])
 def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
-    """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
+    """Compare the walk up to and through the first touch.
+
+    Errors are of first order; their factor depends on where in a step the touch falls.
+    """
     scene = compass(*DRIVES[drives]) if drives in DRIVES else limping()
     until = 0.8
     truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]

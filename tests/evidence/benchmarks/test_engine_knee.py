@@ -1,4 +1,4 @@
-"""The rigid model's swing with a free knee, its limbs' masses off their axes, by every engine that is installed."""
+"""Compare the swing with a free knee in every installed engine with that of the rigid model."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def body_by_body(y):
 
 @pytest.fixture(scope="module")
 def ours():
-    """Where the swing ends, by our rates and a library's method."""
+    """Return the end of the swing by our rates and a library's method."""
     model = rigid_on_slope(KNEED, GRAVITY, SLOPE)
 
     def rate(t, y):

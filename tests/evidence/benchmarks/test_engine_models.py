@@ -1,4 +1,4 @@
-"""What engines are told of a walker, and how a walk is judged from outside: no engine is needed for this."""
+"""Tests of the models that engines get, and of the judgement of their walks. They need no engine."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def scene(request):
 
 
 def our_samples(scene, interval_s, steps):
-    """Our own walk, as an engine with steps of `interval_s` would give it."""
+    """Return our own walk, sampled as an engine with steps of `interval_s` would."""
     result = simulate(scene, "radau5", 1e-9, steps, interval_s)
     return result, result.samples
 
@@ -77,7 +77,7 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
 def test_point_foot_next_to_a_round_one_is_refused_with_a_radius_that_works():
     """The engines have one floor, and a point foot needs a lower one."""
     point = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0}")).config
-    with pytest.raises(ConfigError, match="the other foot is round") as caught:
+    with pytest.raises(ConfigError, match="the other is round") as caught:
         supported_scene(point, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     assert "0.0005 m" in caught.value.advice
     small = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0.0005}")).config
@@ -99,7 +99,9 @@ def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
 
 
 def knees_seen(scene):
-    """Our own walk of two steps, what the rules remember of it, and when knees change: time, places before, after."""
+    """Return our own walk of two steps, the rules' record of it, and the changes of knees: time, places before and
+    after.
+    """
     result, samples = our_samples(scene, 1e-4, 2)
     rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
@@ -118,7 +120,7 @@ def knees_seen(scene):
     return result, rules, changes
 
 
-def test_rules_detect_the_same_knee_locks_and_releases_as_the_contact_walk():
+def test_knees_lock_and_release_in_engines_as_in_the_contact_walk():
     result, rules, changes = knees_seen(kneed())
     # the swing knee locks, the trailing one is released and locks in turn
     assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
@@ -149,7 +151,7 @@ DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.h
 
 
 def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
-    """In the twentieth of a second after the first touch."""
+    """Compare over a twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
     result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)
@@ -161,7 +163,7 @@ def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
     powers = []
     for i in range(begin, end + 1):
         q, v = scene.from_base(tuple(samples.states[i]))
-        powers.append(float(rules.forces(float(samples.time_s[i]), q, v) @ v))
+        powers.append(float(rules.probe.forces(float(samples.time_s[i]), q, v) @ v))
     elastic = 0.5 * hinge_law(scene.ours.whole, HIP_ROW).stiffness * (samples.states[:, 3] - samples.states[:, 2]) ** 2
     given = samples.driven_J[end].sum() - samples.driven_J[begin].sum() + elastic[begin] - elastic[end]
     assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
@@ -188,10 +190,10 @@ def test_ground_forces_do_the_work_measured_at_the_feet(scene):
         q, v = scene.from_base(tuple(samples.states[i]))
         rules = RuleFollower(scene, 3, *scene.from_base(scene.start))
         rules.walk_state.has_ground[:] = samples.has_ground[i]
-        forces = rules.forces(0.0, q, v).copy()
+        forces = rules.probe.forces(0.0, q, v).copy()
         law, friction = scene.ours.normal, scene.ours.friction
         power = 0.0
-        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.feet(q, v)):
+        for foot, (_, height, slip, vertical_velocity) in enumerate(rules.probe.feet(q, v)):
             if height < 0.0 and samples.has_ground[i, foot]:
                 depth = -height
                 share = min(1.0, depth / law.full_damping_penetration)
@@ -201,7 +203,7 @@ def test_ground_forces_do_the_work_measured_at_the_feet(scene):
         assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
-def test_rules_reproduce_touches_and_slip_of_the_contact_walk(scene):
+def test_touches_and_slip_in_engines_are_judged_as_in_the_contact_walk(scene):
     result, samples = our_samples(scene, 1e-4, 4)
     rules = RuleFollower(scene, 4, *scene.from_base(scene.start))
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
@@ -240,7 +242,7 @@ def test_touch_time_between_two_solver_steps_comes_from_a_cubic():
     assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
 
 
-def test_tuning_targets_the_law_under_the_weight_of_the_walker():
+def test_contact_is_tuned_to_the_law_under_the_weight_of_the_walker():
     scene = compass()
     target = contact_target(scene)
     law = scene.ours.normal

@@ -1,4 +1,4 @@
-"""An engine's crash, exception or endless loop ends its own task and nothing else."""
+"""Check that a crash, an exception or an endless loop of an engine ends only its own task."""
 
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace

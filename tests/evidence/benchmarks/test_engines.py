@@ -1,4 +1,4 @@
-"""The stage that walks in other engines: what is told of rows, and of engines that are not there."""
+"""Tests of the stage `engines`: its messages on rows, and on engines that are not installed."""
 
 from dataclasses import dataclass, replace
 
@@ -117,7 +117,7 @@ def test_contact_with_an_unfinished_walk_is_not_the_closest():
     assert closest(fallen)["engine"] == "mujoco"
 
 
-def test_three_digits_must_hold_at_every_smaller_step_size():
+def test_step_size_suffices_only_if_three_digits_hold_at_every_smaller_one():
     steps = three_digits(ROWS, truth())
     assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
     # mujoco's own period is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest

@@ -1,4 +1,4 @@
-"""What a reader sees of the walk in other engines: figures and the report's section, from a stored result."""
+"""Tests of the figures and the report's section on walks in other engines, from a stored result."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Gaits of kneed walkers with planted mistakes, by an integration of their own.
+"""Gaits of kneed walkers with planted mistakes, by an integration that does not use the package.
 
 The equations are Lagrange's, written out by hand for three bodies and round feet. With a locked knee, a leg is one
 body, so the heel strike is that of `mistaken_walks`.
@@ -18,7 +18,7 @@ LOCK = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
 
 
 def sign_of(row, column, phase):
-    """Words and planted sign of a wrong term."""
+    """Return the description and the planted sign of a wrong term."""
     words = f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign {phase}"
     return words, {"signs": {(row, column, phase): -1.0}}
 
@@ -68,7 +68,7 @@ class Knees:
 
     @property
     def straight(self):
-        """A locked leg as one body."""
+        """Return a locked leg as one body."""
         mass = self.thigh_mass + self.shank_mass
         below_thigh = self.thigh_below
         below_shank = self.thigh_length + self.shank_below
@@ -161,7 +161,7 @@ def step(legs, start):
 
 
 def random_knees(generator):
-    """A kneed walker that has a gait, more often than not."""
+    """Return a random kneed walker, which has a gait more often than not."""
 
     def between(low, high, digits):
         return float(np.round(generator.uniform(low, high), digits))

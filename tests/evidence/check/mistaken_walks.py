@@ -1,4 +1,4 @@
-"""Gaits of straight-legged walkers with planted mistakes, by an integration of their own.
+"""Gaits of straight-legged walkers with planted mistakes, by an integration that does not use the package.
 
 It shares nothing with the code that judges: the equations are Lagrange's, written out by hand for a walker with round
 feet, and the heel strike balances the momenta of three bodies with vectors.
@@ -197,7 +197,7 @@ def step(legs, start):
 
 
 def gait(legs, guess, step=step):
-    """State just after the heel strike of the gait near a guess, and its period; None if there is none."""
+    """Return the state just after the heel strike of the gait near a guess and its period, or None if there is none."""
     state, move, error, slopes = np.array(guess), None, None, None
     for _ in range(25):
         try:
@@ -240,7 +240,7 @@ def gait_with(legs, start, mistake, step=step):
 
 
 def random_legs(generator):
-    """A walker with round feet and inertia that has a gait, more often than not."""
+    """Return a random walker with round feet and inertia, which has a gait more often than not."""
     return Legs(
         length=1.0,
         mass=float(np.round(generator.uniform(0.3, 1.0), 2)),
@@ -271,12 +271,12 @@ def config_of(legs):
 
 
 def printed(numbers, digits):
-    """Numbers rounded to significant digits, as texts."""
+    """Return numbers rounded to significant digits, as texts."""
     return [f"{number:.{digits - 1 - math.floor(math.log10(abs(number)))}f}" for number in numbers]
 
 
 def right_gait(config):
-    """State of the right gait that the package chooses; None if the walker has none."""
+    """Return the state of the right gait that the package chooses, or None if the walker has none."""
     checked = checked_config(config, {})
     chosen = find_gaits(rigid_walker(checked), 0).gait
     if chosen is None:
@@ -292,13 +292,13 @@ def checked_config(config, check):
 
 
 def answer_to(config, state, period, digits):
-    """Answer of the check to a gait of which state and period are printed to some digits."""
+    """Return the check's answer to a gait whose state and period are printed to some digits."""
     values = {"state": printed(state, digits), "period_s": printed([period], digits)[0]}
     return check_gait(checked_config(config, {"printed": values}))
 
 
 def walkers(seed, random=random_legs, config_of=config_of):
-    """Random walkers that have a gait, with its state."""
+    """Yield random walkers that have a gait, with its state."""
     generator = np.random.default_rng(seed)
     while True:
         legs = random(generator)

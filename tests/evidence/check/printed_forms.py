@@ -26,13 +26,16 @@ class Form:
 
 
 def random_convention(generator, changes):
-    """A form with some conventions changed."""
+    """Return a form with some of its conventions changed."""
     names = generator.sample([*OTHERS], changes)
     return Form(tuple((name, generator.choice(OTHERS[name])) for name in sorted(names)))
 
 
 def printed_in(form, config, state, period, digits):
-    """Texts of a state just after a strike and of its period; angles of `state` are from the slope's normal."""
+    """Return the printed texts of a state just after a heel strike and of its period.
+
+    Angles of `state` are from the slope's normal.
+    """
     tilt = config["slope_rad"] if form.origin == "vertical" else 0.0
     swing, stance, swing_rate, stance_rate = state
     legs = {"swing": (swing - tilt, swing_rate), "stance": (stance - tilt, stance_rate)}
@@ -73,7 +76,7 @@ ODD_VALUES = (
 
 
 def odd_file(generator, values=ODD_VALUES):
-    """A config whose text is damaged in one or two places."""
+    """Return a config whose text is damaged in one or two places."""
     text = GOOD
     for _ in range(generator.choice((1, 1, 2))):
         lines = text.split(b"\n")

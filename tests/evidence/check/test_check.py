@@ -1,4 +1,4 @@
-"""Printed gaits beside right ones: digits, conventions, balances, and the command."""
+"""Tests of `walkerlab check`: digits, conventions, balances, and the command."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.check.answer import check_gait
 from walkerlab.evidence.check.gaits import gait_near
-from walkerlab.evidence.check.plain_walker import plain_walker
+from walkerlab.evidence.check.plain_walker import plain_walker, take_step
 from walkerlab.evidence.check.printed import Item, equal_digits
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
@@ -96,7 +96,7 @@ def test_unexplained_state_of_a_kneed_walker_raises_no_error():
     assert answer.finding == "different, unexplained"
 
 
-def test_a_mistake_is_found_in_conventions_that_are_not_stated():
+def test_mistake_is_found_in_conventions_that_are_not_stated():
     """The state is that of a script whose strike is wrong; its second angle is taken for an absolute one."""
     config = load(PUBLISHED / "passivewalker-2009.yaml", ["check.angles.second=absolute"]).config
     (explanation,) = check_gait(config)["explanations"]
@@ -110,11 +110,11 @@ def test_energy_is_constant_within_a_plain_swing():
     walker = plain_walker(load(Path("round-feet")).config)
     start = np.array(find_gaits(rigid_walker(load(Path("round-feet")).config), 0).gait.state)
     start[:2] += walker.slope
-    step = walker.step(start)
+    step = take_step(walker, start)
     assert walker.energy(step.before) == pytest.approx(walker.energy(start), abs=1e-11)
 
 
-def test_digits_count_as_typed_with_quotes_or_without(tmp_path):
+def test_digits_are_counted_as_typed_with_or_without_quotes(tmp_path):
     check = "extends: paper\ncheck:\n  printed: {step_length_m: %s, period_s: '0.70'}\n"
     plain, quoted = (load(written(tmp_path, check % text)).config.check for text in ("0.3710", "'0.3710'"))
     assert plain.printed == quoted.printed == {"step_length_m": "0.3710", "period_s": "0.70"}
@@ -131,14 +131,14 @@ def test_published_state_is_explained_by_the_heel_strike_of_its_script():
     assert hip["residual"] == pytest.approx(3.15197e-4, rel=1e-4)
 
 
-def test_the_papers_state_follows_from_its_sign_error():
+def test_state_of_the_paper_follows_from_its_sign_error():
     answer = walkerlab.check("paper", {"state": ["-0.2022", "0.1674", "-0.60", "-0.84"]})
     (explanation,) = answer.explanations
     assert answer.finding == "explained"
     assert explanation["what"].startswith("the term of the swing leg's squared rate in the equation of the stance leg")
 
 
-def test_a_walk_by_eulers_method_comes_closest_to_a_published_gait_with_knees():
+def test_walk_by_eulers_method_comes_closest_to_a_published_gait_with_knees():
     answer = check_gait(load(PUBLISHED / "hsu-chen-2007.yaml").config)
     assert answer["finding"] == "different, unexplained"
     assert answer["closest"]["what"] == "the equations are integrated by Euler's method with a step of 0.001 s"
@@ -167,7 +167,7 @@ def test_multiplier_of_minus_one_is_explained_by_a_start_on_the_heel_strike():
 
 
 def printed_with(origin, second, unit, order, positive):
-    """The compass's gait in some conventions, computed from its state by hand."""
+    """Return the compass's gait in some conventions, computed from its state by hand."""
     swing, stance, dswing, dstance = walkerlab.find_gait().state
     tilt = 0.0174 if origin == "slope-normal" else 0.0
     angles = {"swing": (swing + tilt, dswing), "stance": (stance + tilt, dstance)}
@@ -225,7 +225,7 @@ def test_leg_length_without_the_foot_radius_is_recognised():
     assert answer.explanations[0]["what"] == "the stated leg length excludes the foot's radius"
 
 
-def test_a_misprinted_parameter_is_found():
+def test_misprinted_parameter_is_found():
     right = load(Path("paper"), ["walker.hip_mass_kg=10", "slope_rad=0.0147"]).config
     state = find_gaits(rigid_walker(right), 0).gait.state
     answer = walkerlab.check("paper", {"state": [f"{value:.7f}" for value in state]})
@@ -235,19 +235,19 @@ def test_a_misprinted_parameter_is_found():
     assert all("is accepted as soon as" in what for what in told[1:])
 
 
-def test_a_lost_sign_and_transposed_digits_are_misprints():
+def test_lost_sign_and_transposed_digits_are_misprints():
     lost = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "0.605819", "-0.861041"]})
     swapped = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "-0.605819", "-0.816041"]})
     assert lost.explanations[0]["what"] == "the sign of the printed swing rate is wrong"
     assert swapped.explanations[0]["what"] == "two digits of the printed stance rate are transposed"
 
 
-def test_difference_of_a_single_printed_value_is_not_explained():
+def test_single_printed_value_that_differs_is_not_explained():
     answer = walkerlab.check("paper", {"period_s": "0.7064"})
     assert (answer.finding, answer.explanations) == ("different, unexplained", [])
 
 
-def test_states_before_the_strike_and_in_mid_stance_are_right(tmp_path):
+def test_states_before_the_heel_strike_and_at_mid_stance_are_recognised(tmp_path):
     config = load(Path("paper")).config
     walker = plain_walker(config)
     tilt = np.array([0.0174, 0.0174, 0.0, 0.0])
@@ -265,13 +265,13 @@ def test_states_before_the_strike_and_in_mid_stance_are_right(tmp_path):
     assert [each["conserved"] for each in wrong.momenta] == [False, False]
 
 
-def test_walkers_of_parts_are_not_comparable():
+def test_walkers_built_from_parts_cannot_be_checked():
     answer = walkerlab.check("parts", {"period_s": "0.70"})
     assert (answer.finding, answer["values"][0]["verdict"]) == ("not-comparable", "not-comparable")
     assert "walkers of type parts" in answer.reason
 
 
-def test_a_slope_without_a_gait_is_not_comparable():
+def test_gait_printed_for_a_slope_without_gaits_cannot_be_checked():
     level = load(Path("paper"), ["slope_rad=0"]).config
     answer = walkerlab.check(level, {"period_s": "0.70"})
     assert answer.finding == "not-comparable"
@@ -332,7 +332,7 @@ def test_answer_says_which_values_a_cause_explains_and_how_far_off_others_are():
     assert "After one exact step it has changed by 0.0045 (angles in rad, rates times sqrt(L/g)), 45 units" in words
 
 
-def test_a_state_is_typed_on_the_command_line():
+def test_state_is_typed_on_the_command_line():
     done = run("-c", "paper", "--state", "[-0.2042, 0.1694; -0.6058 -0.8610]")
     assert done.exit_code == 0
     assert "Right: 4 printed values reproduced to the last digit." in done.output
@@ -348,7 +348,7 @@ def test_init_writes_a_form_for_a_printed_gait(tmp_path):
     assert "Right: 1 printed value reproduced" in run(file).output
 
 
-def test_published_configs_have_other_names_than_built_in_ones_and_are_on_a_page():
+def test_published_configs_have_unique_names_and_are_on_a_page():
     assert not {path.stem for path in PUBLISHED.glob("*.yaml")} & {*builtin_names()}
     assert len([*PUBLISHED.glob("*.yaml")]) >= 12
     docs = Path(__file__).parents[3] / "docs"
@@ -356,7 +356,7 @@ def test_published_configs_have_other_names_than_built_in_ones_and_are_on_a_page
     assert all(f"## {path.stem}\n" in pages for path in PUBLISHED.glob("*.yaml"))
 
 
-def test_published_gaits_are_known_to_all_commands(tmp_path, monkeypatch):
+def test_every_command_accepts_a_published_gait(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     name = "published/garcia-1998.yaml"
     assert "Right: 2 printed values reproduced" in run(name).output
@@ -365,7 +365,7 @@ def test_published_gaits_are_known_to_all_commands(tmp_path, monkeypatch):
     assert "0.199832" in shown.output
 
 
-def test_the_form_for_a_printed_gait_has_only_what_a_check_reads(tmp_path):
+def test_form_for_a_printed_gait_has_only_keys_that_check_reads(tmp_path):
     file = tmp_path / "my-gait.yaml"
     CliRunner().invoke(program(), ["init", str(file), "--check", "--type", "kneed"])
     keys = [line.partition(":")[0] for line in file.read_text().splitlines() if line[:1].isalpha()]

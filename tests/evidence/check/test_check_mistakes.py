@@ -1,4 +1,4 @@
-"""Planted mistakes are named, right gaits are reproduced, and unknown mistakes stay unexplained."""
+"""Check that planted mistakes are named, right gaits reproduced, and unknown mistakes left unexplained."""
 
 import random
 from itertools import islice
@@ -30,20 +30,20 @@ def first_gait_with(mistake, found, step=mistaken_walks.step):
     return next((legs, each) for legs, each in gaits if each is not None)
 
 
-def test_a_hand_written_walker_has_the_same_gait(walker):
+def test_hand_written_walker_has_the_same_gait(walker):
     legs, state = walker
     found, _ = gait(legs, state)
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
 
 
-def test_a_hand_written_kneed_walker_has_the_same_gait():
+def test_hand_written_kneed_walker_has_the_same_gait():
     legs, state = next(walkers(1, mistaken_knees.random_knees, mistaken_knees.config_of))
     found, _ = gait(legs, state, mistaken_knees.step)
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize(("words", "digits"), SAMPLE)
-def test_a_planted_mistake_is_named(words, digits):
+def test_planted_mistake_is_named(words, digits):
     legs, found = first_gait_with(MISTAKES[words], walkers(7))
     answer = answer_to(config_of(legs), *found, digits)
     causes = [each["what"] for each in answer["explanations"]]
@@ -53,7 +53,7 @@ def test_a_planted_mistake_is_named(words, digits):
 
 
 @pytest.mark.parametrize(("words", "digits"), KNEED_SAMPLE)
-def test_a_mistake_planted_into_a_walker_with_knees_is_named(words, digits):
+def test_mistake_planted_into_a_walker_with_knees_is_named(words, digits):
     found = walkers(1, mistaken_knees.random_knees, mistaken_knees.config_of)
     legs, printed = first_gait_with(mistaken_knees.MISTAKES[words], found, mistaken_knees.step)
     answer = answer_to(mistaken_knees.config_of(legs), *printed, digits)
@@ -62,7 +62,7 @@ def test_a_mistake_planted_into_a_walker_with_knees_is_named(words, digits):
 
 
 @pytest.mark.parametrize("digits", [3, 6, 12])
-def test_a_right_gait_is_reproduced_without_an_explanation(digits):
+def test_right_gait_is_reproduced_without_an_explanation(digits):
     for legs, state in islice(walkers(digits), 2):
         answer = answer_to(config_of(legs), *gait(legs, state), digits)
         assert (answer["finding"], answer["explanations"]) == ("reproduced", [])
@@ -70,7 +70,7 @@ def test_a_right_gait_is_reproduced_without_an_explanation(digits):
 
 
 @pytest.mark.parametrize(("name", "digits"), [("leak", 4), ("drag", 10), ("spring", 6), ("bounce", 4)])
-def test_a_mistake_that_is_on_no_list_stays_unexplained(walker, name, digits):
+def test_mistake_that_is_on_no_list_stays_unexplained(walker, name, digits):
     legs, state = walker
     found = gait_with(legs, state, {name: UNLISTED[name]})
     answer = answer_to(config_of(legs), *found, digits)
@@ -87,7 +87,7 @@ def test_conventions_that_differ_in_several_ways_are_found(walker, changes):
     assert {each["kind"] for each in answer["explanations"]} == {"convention"}
 
 
-def test_a_mistake_is_named_in_the_convention_that_puts_both_feet_on_the_slope():
+def test_mistake_is_named_in_the_convention_that_puts_both_feet_on_the_slope():
     """The state is printed from the slope's normal and with the legs exchanged, and the config states neither."""
     words = "the legs' inertia is left out"
     legs, ((swing, stance, dswing, dstance), period) = first_gait_with(MISTAKES[words], walkers(7))

@@ -98,7 +98,7 @@ PRINTED_FOOT = sp.Matrix(
 
 
 def differing(one, other):
-    """Entries in which two matrices differ, with the difference."""
+    """Return the entries in which two matrices differ, with the difference."""
     difference = (one - other).applyfunc(lambda entry: sp.simplify(sp.expand_trig(entry)))
     indices = ((i, j) for i in range(one.rows) for j in range(one.cols))
     return {index: difference[index] for index in indices if difference[index] != 0}

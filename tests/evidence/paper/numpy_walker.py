@@ -1,4 +1,4 @@
-"""Appendix A written down once more, in NumPy and SciPy: what the errata are checked against."""
+"""Appendix A written once more, in NumPy and SciPy, to check the errata."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -49,7 +49,7 @@ def swing(start, sign, slope, longest=2.0):
 
 
 def fall(start, sign, longest):
-    """The same motion without a look at the feet."""
+    """Integrate the same motion without watching the feet."""
     return solve_ivp(
         swing_rates(sign), (0.0, longest), start, method="DOP853", rtol=1e-11, atol=1e-13, dense_output=True
     )

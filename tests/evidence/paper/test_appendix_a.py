@@ -1,4 +1,4 @@
-"""What the paper prints, against Lagrange's equations derived here, and both against the compiled physics."""
+"""Compare the printed equations with Lagrange's, derived here, and both with the compiled physics."""
 
 import math
 
@@ -119,7 +119,7 @@ def arguments(walker, state, accelerated=(0.0, 0.0)):
 
 
 def close(value, expected, scale):
-    """Equal up to rounding of terms as large as `scale`, which cancellation in D^-1 can magnify."""
+    """Whether two values agree up to rounding of terms of size `scale`, which cancellation in D^-1 can magnify."""
     return abs(value - expected) <= 1e-11 * scale
 
 

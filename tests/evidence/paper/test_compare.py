@@ -1,4 +1,4 @@
-"""The comparison of both models, from results laid out as the other stages lay them out."""
+"""Tests of the comparison of both models, with results in the layout of the other stages."""
 
 import json
 
@@ -40,7 +40,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def gaits(study):
-    """A result of fixedpoint, as far as others read it."""
+    """A result of fixedpoint with the parts that other stages read."""
 
     def entry(name, model):
         return {
@@ -91,7 +91,7 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
 
 @pytest.fixture(scope="module")
 def compared(gaits):
-    """Compare with a contact walk of so many steps, with parts of its record left out."""
+    """Compare with a contact walk of some steps, leaving out parts of its record."""
 
     def result(*sets, steps=10, leave_out=(), outcome="walked", samples=None, fixedpoint=gaits):
         config = load(None, sets).config
@@ -134,7 +134,7 @@ def test_table_3_has_the_values_of_both_models_and_the_paper(compared, study):
     assert (table["E_avg"]["paper_matlab"], table["E_avg"]["paper_adams"]) == (150.13, 150.14)
 
 
-def test_slower_copy_differs_in_time_but_not_in_phase(compared):
+def test_slowed_copy_of_a_walk_differs_in_time_but_not_in_phase(compared):
     summary = compared().summary
     angle, velocity = summary["max_angle_error_rad"], summary["max_velocity_error_rad_s"]
     assert angle["raw"] > 0.05 > 1e-3 > angle["aligned"]
@@ -144,7 +144,7 @@ def test_slower_copy_differs_in_time_but_not_in_phase(compared):
     assert summary["left_out"] == []
 
 
-def test_start_off_the_fixed_point_is_listed_as_a_departure(compared):
+def test_start_off_the_fixed_point_is_listed_as_a_departure_from_the_paper(compared):
     assert compared().summary["departures"] == ["the start is not the rigid model's fixed point"]
 
 

@@ -1,4 +1,4 @@
-"""The errata of the paper, measured again by other routes."""
+"""Measure the errata of the paper again, by other methods."""
 
 from fractions import Fraction
 
@@ -8,21 +8,21 @@ import pytest
 from numpy.testing import assert_allclose
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, impact
-from walkerlab.evidence.paper.errata import errata
-from walkerlab.evidence.paper.misprints import (
+from walkerlab.evidence.paper.printed import TABLE_2, X_P, speed_difference, walker_of_the_paper
+from walkerlab.evidence.paper.study import (
     MISPRINTED,
     RIGHT,
+    errata,
     fixed_point,
     foothold_speed_after_impact,
     height_over_slope,
     inertia_at_impact,
     step,
+    study_the_paper,
     swing_foot,
     swing_foot_gradient,
     velocities_after_impact,
 )
-from walkerlab.evidence.paper.printed import TABLE_2, X_P, speed_difference, walker_of_the_paper
-from walkerlab.evidence.paper.study import study_the_paper
 
 SLOPE = 0.0174
 BEFORE = (0.1674, -0.2022, -1.05, -0.45)
@@ -56,7 +56,7 @@ def test_fixed_points_return_after_a_step_of_an_independent_integration(study, n
     assert_allclose((before[1], before[0], after[1], after[0]), model.state, atol=1e-9)
 
 
-def test_only_the_sign_of_a_5_as_printed_gives_x_p():
+def test_only_the_printed_sign_of_equation_a_5_gives_x_p():
     def distance(state):
         return max(abs(x - entry.value) / entry.digits.unit for x, entry in zip(state, X_P, strict=True))
 
@@ -65,7 +65,7 @@ def test_only_the_sign_of_a_5_as_printed_gives_x_p():
     assert distance(study.corrected.state) > 10.0
 
 
-def test_corrected_impact_of_a_57_equals_the_one_in_use():
+def test_corrected_equation_a_57_equals_the_impact_in_use():
     walker = walker_of_the_paper(CORRECTED)
     after = velocities_after_impact(walker, BEFORE, RIGHT)
     theta_1, theta_2, omega_1, omega_2 = impact(walker, *BEFORE)
@@ -124,7 +124,7 @@ def test_energy_of_the_adams_start_is_that_of_its_masses(study):
     assert study.adams.energy > 1.4 * 150.14
 
 
-def test_adams_start_needs_a_pulling_ground(study):
+def test_adams_start_would_need_a_ground_that_pulls(study):
     start = [row.adams.value for row in TABLE_2]
     fall, h = numpy_walker.fall(start, -1.0, longest=0.3), 1e-5
 
@@ -189,7 +189,7 @@ def test_errata_quote_the_measured_values(found):
     assert "cut off" in found["eq. 11, x_p"].measured
 
 
-def test_contact_parameters_have_three_readings(found):
+def test_contact_parameters_can_be_read_in_three_ways(found):
     """In a model in metres 10^8 N/m^2.2 carry 20 kg 2.5 mm deep; 1000^1.2 times more carry them 0.06 mm deep."""
     measured = found["section 4, Fig. 4b"].measured
     weight = 20 * 9.81

@@ -1,4 +1,4 @@
-"""The heel strike against the paper's own 6 x 6 system and against the laws of mechanics."""
+"""Compare the heel strike with the paper's own 6 x 6 system and with the laws of mechanics."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The printed numbers: how they are read, when a value agrees with one, and what verdicts follow."""
+"""Tests of printed numbers: how they are read, when a value agrees with one, and which verdicts follow."""
 
 import re
 from dataclasses import replace
@@ -195,7 +195,7 @@ def test_each_printed_value_is_counted_once(rows, study):
     assert len(printed_twice) == 4 + 2
 
 
-def test_values_used_as_given_are_inputs(rows):
+def test_printed_values_used_unchanged_count_as_inputs(rows):
     assert {entry for entry, row in rows().items() if row.verdict == Verdict.INPUT} == {*INPUTS}
 
 
@@ -259,7 +259,7 @@ def test_matlab_energy_is_explained_and_adams_energy_is_not_reproduced(rows):
     assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
-def test_walking_start_does_not_explain_a_fall(rows):
+def test_fall_is_not_explained_by_a_start_that_walks(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.values["contact"]) == (Verdict.NOT_REPRODUCED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence

@@ -1,4 +1,4 @@
-"""The adjustment: not needed on the paper's contact, found where it is, and words where there is none."""
+"""Tests of the adjustment: not needed on the paper's contact, found where it exists, and reported where it does not."""
 
 import functools
 from dataclasses import replace
@@ -11,7 +11,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.errors import NoAnswer
 from walkerlab.evidence.paper import tune
-from walkerlab.evidence.paper.tune_limit import LimitFindings, causes
+from walkerlab.evidence.paper.tune import LimitFindings, causes
 from walkerlab.physics.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, ContactFactors, Distance, Extrapolation
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
@@ -118,7 +118,7 @@ NO_FRICTION = ("contact.static_friction=0", "contact.dynamic_friction=0")
 @pytest.mark.parametrize(
     "sets", [NO_FRICTION, ("contact.static_friction=0.05", "contact.dynamic_friction=0.04")], ids=["none", "little"]
 )
-def test_missing_walking_start_is_explained(sets):
+def test_failure_to_find_a_start_that_walks_is_explained(sets):
     content = small("paper", *sets)
     gait, found = content.summary["gait"], content.summary["adjustment"]
     assert not gait["found"]
@@ -140,7 +140,7 @@ def test_page_says_that_no_start_leads_to_walking():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_that_need_a_missing_gait_give_no_answer():
+def test_pads_laid_for_a_missing_gait_give_no_answer():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 

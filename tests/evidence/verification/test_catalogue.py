@@ -1,4 +1,4 @@
-"""The catalogue: what it covers, that it is sound, and that some of each family end as it says."""
+"""Tests of the catalogue: its range, its validity, and the ends of some cases of each family."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Problems with known answers through the contact code, and the references by yet another route."""
+"""Tests of the contact code on problems with known answers, and of the references by one more method."""
 
 import math
 

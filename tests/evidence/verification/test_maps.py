@@ -1,4 +1,4 @@
-"""The maps: cells are what the walks say, a run that was cut off goes on, and figures are drawn of them."""
+"""Tests of the maps: cells agree with the walks, an interrupted run continues, and figures are drawn."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ CELLS = 2
 
 
 class CutOff(Silent):
-    """Interrupts after so many calls of `advance`."""
+    """A progress that interrupts the run after some calls of `advance`."""
 
     def __init__(self, left):
         self.left, self.done, self.total = left, 0, 0
@@ -70,7 +70,7 @@ def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():
 
 
 def test_cells_whose_runs_end_differently_have_no_error():
-    """Also where both runs end alike, but after different numbers of steps."""
+    """This includes runs that end in the same way after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
     rows = (
         [walked, 4.0, walked, 1e-7, 9.0],

@@ -1,22 +1,22 @@
-"""Momentum on compliant ground: it balances, and what is a little wrong does not."""
+"""Check that momentum balances on compliant ground, and that slightly wrong walks violate the balance."""
 
 import numpy as np
 import pytest
 
 from walkerlab.config.analyses import Case
-from walkerlab.evidence.verification import momentum
+from walkerlab.evidence.verification import starts
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
-from walkerlab.evidence.verification.momentum import (
+from walkerlab.evidence.verification.starts import (
     MAX_UNKNOWN,
     MEASURE,
     add_midpoints,
     impulse,
     momentum_balance,
     momentum_finding,
+    prepare_start,
     split,
     unsettled,
 )
-from walkerlab.evidence.verification.starts import prepare_start
 from walkerlab.evidence.verification.verdict import NotMeasured
 
 CASES = {case.name: case for case in package_cases()}
@@ -69,7 +69,7 @@ def test_momentum_is_not_measured_if_slip_is_below_the_tolerance():
 
 
 def test_momentum_is_not_measured_if_the_quadrature_does_not_converge(monkeypatch):
-    monkeypatch.setattr(momentum, "MAX_UNKNOWN", 1e-9)
+    monkeypatch.setattr(starts, "MAX_UNKNOWN", 1e-9)
     said = momentum_finding(*ready_for("paper"))
     assert isinstance(said, NotMeasured)
     assert "do not settle" in said.why

@@ -1,10 +1,10 @@
-"""Ordinary methods are shown as they are: what they say, and what they do not."""
+"""Tests of ordinary methods: which failures they report, and which they do not."""
 
 import numpy as np
 import pytest
 
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
-from walkerlab.evidence.verification.ordinary import MAX_ORDINARY_EVALUATIONS, Arrival, choices
+from walkerlab.evidence.verification.judge import MAX_ORDINARY_EVALUATIONS, Arrival, choices
 
 PAPER = next(case for case in package_cases() if case.name == "paper")
 ARRIVAL = Arrival("c", 1.0, np.zeros(8), np.ones(8))
@@ -24,7 +24,7 @@ def test_ordinary_methods_solve_the_rigid_walk():
     assert all(0.0 < choice.error < 1e-2 and choice.verdict == "fine" for choice in found)
 
 
-def test_walk_without_steps_shows_no_methods():
+def test_walk_without_steps_is_not_compared_with_ordinary_methods():
     for name in ("split", "rigid-split", "rigid-standing-still", "rigid-slope-minus-1-deg"):
         case = next(case for case in package_cases() if case.name == name)
         assert choices(case, config_of(case)) == ()

@@ -1,4 +1,4 @@
-"""A scene's own extremes: what they cover for which walker, and that measures hold for walkers of every kind."""
+"""Tests of the extreme cases of a scene: their range for each walker, and the measures for every kind of walker."""
 
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
 from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scaled, scene_cases, to_twin
 from walkerlab.evidence.verification.judge import CaseCell
-from walkerlab.evidence.verification.momentum import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.evidence.verification.stability import resolve_scene
+from walkerlab.evidence.verification.starts import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units
@@ -39,7 +39,7 @@ def cases_of(config, gait=GAIT):
 
 
 def start_of(config):
-    """Legs apart on the slope, knees straight and the torso on the bisector, moving."""
+    """Return a moving start: legs apart on the slope, knees straight and the torso on the bisector."""
     model = rigid_walker(config, "corrected")
     bodies = len(model.zero_state) // 2
     stance = 0.2
@@ -141,13 +141,13 @@ def numbers_of(block):
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 
 
-def test_known_problems_are_shared_by_all_scenes():
+def test_every_scene_uses_the_same_known_problems():
     stage = PIPELINE["known-problems"]
     slices = [Keys().identity(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
     assert slices == [{}, {}]
 
 
-def test_verification_reads_the_scene_only_for_other_walkers():
+def test_verification_reads_the_scene_unless_the_walker_is_that_of_the_paper():
     stage = PIPELINE["stability"]
     steep, paper = (Keys().identity(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
     assert steep == paper

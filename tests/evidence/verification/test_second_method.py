@@ -1,4 +1,4 @@
-"""A case is walked by another method too: by which, how far both may be apart, and what is said if there is none."""
+"""Tests of the second method for a case: the choice, the allowed difference, and the message if there is none."""
 
 from types import SimpleNamespace
 
@@ -14,7 +14,7 @@ CASES = {case.name: case for case in package_cases()}
 
 
 def ending(*outcomes):
-    """A walk that ends so with the first method it is asked for, so with the next; and what it was asked for."""
+    """Return a walk that ends with each outcome in turn, and the list of methods and budgets requested."""
     asked, left = [], list(outcomes)
 
     def walk(method, budget):

@@ -1,4 +1,4 @@
-"""The stage: what it stores and says, the same with one and with two processes, and cases of one's own."""
+"""Tests of the stage `stability`: its results with one and two processes, and a user's own cases."""
 
 from dataclasses import asdict, replace
 from types import SimpleNamespace
@@ -184,7 +184,7 @@ def test_errors_in_case_lines_of_the_config_have_a_position(tmp_path):
         load(tmp_path / "own.yaml")
 
 
-def test_case_may_use_pads_at_the_pitch_of_the_contact_gait():
+def test_extreme_case_may_use_pads_at_the_pitch_of_the_contact_gait():
     case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": {"pad_pitch": "own"}})
     assert judge(case, config_of(case)).failures == ()
 
@@ -204,7 +204,7 @@ def test_verdict_names_what_failed():
     assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")
 
 
-def test_case_ignores_the_pad_pitch_on_plain_ground():
+def test_extreme_case_ignores_the_pad_pitch_on_plain_ground():
     ground = {"terrain": "after-mid-swing", "pad_pitch": "own"}
     case = Case(name="x", expected=("walked",), reason="r", steps=2, config={"slope_deg": 4.0, "contact": ground})
     plain = case.model_copy(update={"config": {"slope_deg": 4.0, "contact": {"terrain": "after-mid-swing"}}})

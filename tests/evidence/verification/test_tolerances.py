@@ -1,4 +1,4 @@
-"""A case ends alike at whatever tolerance it is walked."""
+"""Check that a case ends in the same way at every tolerance."""
 
 import numpy as np
 import pytest

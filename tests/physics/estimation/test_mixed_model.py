@@ -1,4 +1,4 @@
-"""The likelihood of a linear model with random heights, against dense linear algebra."""
+"""Compare the likelihood of a linear model with random heights with dense linear algebra."""
 
 from dataclasses import replace
 

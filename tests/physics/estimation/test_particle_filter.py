@@ -1,4 +1,4 @@
-"""The likelihood of a walk against a bootstrap particle filter over exact walks on rough ground.
+"""Compare the likelihood of a walk with a bootstrap particle filter over exact walks on rough ground.
 
 Gordon, Salmond, Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation, IEE Proc. F 140 (1993).
 """

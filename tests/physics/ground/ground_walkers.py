@@ -1,4 +1,4 @@
-"""Walkers on compliant ground for the tests of their physics, and states of them put down by hand."""
+"""Walkers on compliant ground, and states of them placed by hand, for tests of their physics."""
 
 import math
 
@@ -34,7 +34,7 @@ def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):
 
 
 def placed(walker, foot, depth, theta, omega, slip, vertical_velocity, along=0.0):
-    """The state in which a foot's lowest point is `depth` inside the ground and moves with (slip, climb)."""
+    """Return the state in which a foot's lowest point is `depth` inside the ground and moves with (slip, climb)."""
     whole, n = walker.whole, len(theta)
     x, y, rolling = (lever[foot, :n] for lever in (whole.foot_x, whole.foot_y, whole.rolling))
     tilted, omega = np.array(theta) + walker.slope, np.array(omega)

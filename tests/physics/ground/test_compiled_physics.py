@@ -1,4 +1,4 @@
-"""Machine code and the Python it was made from give the same motion."""
+"""Check that machine code and the Python code from which it is compiled give the same motion."""
 
 import ground_walkers as ground
 import numpy as np

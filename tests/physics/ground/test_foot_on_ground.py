@@ -1,4 +1,4 @@
-"""A ball foot in the ground: where the force acts, what it does to the energy, and its exact derivatives."""
+"""Tests of a ball foot in the ground: point of action of the force, energy, and exact derivatives."""
 
 import ground_walkers as ground
 import numpy as np
@@ -185,7 +185,7 @@ def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity
 
 
 def creep_velocity(slope, friction):
-    """The velocity to which a loaded block settles on a slope."""
+    """Return the velocity at which a loaded block creeps steadily down a slope."""
     block = ground.sledge(friction=friction, slope=slope)
     system = place_on_ground(block, BOTH)
     start = ground.placed(block, 0, 3e-5, (-slope,), (0.0,), 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The forms of a walker: one whose locked thigh and shank are one body moves as the one that holds them together."""
+"""Check that a locked knee makes the same motion in both forms: as one body, and as two that are held together."""
 
 import numpy as np
 import pytest
@@ -29,12 +29,12 @@ KNEES = [(LOCKED, RELEASED), (RELEASED, LOCKED), (LOCKED, LOCKED)]
 
 
 def walker_of(assembly, **rules):
-    """The walker on compliant ground."""
+    """Build the walker on compliant ground."""
     return contact_walker(assembly, LAW, FRICTION, 9.81, 0.05, KneeRules(**rules))
 
 
 def state_in_line(walker, knee):
-    """A state with both feet in the ground, locked knees straight and a torso on the bisector."""
+    """Return a state with both feet in the ground, locked knees straight and a torso on the bisector."""
     whole, n = walker.whole, int(walker.whole.bodies)
     angles = np.array([-0.21, 0.17, -0.33, 0.11, 0.0][:n])
     rates = np.array([-0.6, -1.1, 0.9, -0.4, 0.0][:n])

@@ -1,4 +1,4 @@
-"""Friction that creeps: ADAMS's Coulomb law."""
+"""Tests of friction that creeps, ADAMS's Coulomb law."""
 
 import numpy as np
 import pytest

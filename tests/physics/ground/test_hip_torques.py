@@ -1,4 +1,4 @@
-"""Torques between the legs on compliant ground: as the rigid model has them, on whichever leg swings."""
+"""Check that torques between the legs are those of the rigid model, whichever leg swings."""
 
 from pathlib import Path
 

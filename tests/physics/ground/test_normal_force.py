@@ -1,4 +1,4 @@
-"""The IMPACT law and the STEP it is blended with."""
+"""Tests of the IMPACT law and of STEP, which blends in its damping."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The walker pinned at its stance foot: the rigid swing on a leg that ends at the ball's centre."""
+"""Check that a walker pinned at its stance foot moves as in the rigid swing, on a leg down to the ball's centre."""
 
 import math
 

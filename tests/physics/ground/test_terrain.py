@@ -1,4 +1,4 @@
-"""Pads in lanes, and the plane that lets scuffing feet through."""
+"""Tests of pads in lanes, and of the plane that lets scuffing feet through."""
 
 import math
 
@@ -56,7 +56,7 @@ def test_pads_of_each_leg_are_centred_on_its_footholds(pitch, j):
 
 @pytest.mark.parametrize("has_ground", [False, True])
 @pytest.mark.parametrize("ahead", [False, True])
-def test_pads_do_not_move(has_ground, ahead):
+def test_pads_have_the_same_ground_at_any_time(has_ground, ahead):
     terrain = walked_on(0.4)
     for stands in (True, False):
         assert has_ground_in_air(terrain, has_ground, stands, ahead) == has_ground

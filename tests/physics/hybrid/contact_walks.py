@@ -1,4 +1,4 @@
-"""Walks on compliant ground for tests: configs changed by --set, starts changed by hand."""
+"""Walks on compliant ground for tests, with configs changed as by --set and with changed starts."""
 
 import functools
 

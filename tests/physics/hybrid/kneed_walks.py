@@ -1,4 +1,4 @@
-"""Kneed walkers on plane compliant ground for tests: the walker of Hsu Chen, its contact the paper's scaled by mass."""
+"""Kneed walkers on plane compliant ground for tests: Hsu Chen's walker, with the paper's contact scaled by mass."""
 
 import functools
 

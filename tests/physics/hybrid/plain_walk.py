@@ -1,4 +1,4 @@
-"""Walking on compliant ground as one would write it in an afternoon: the rules of docs/theory.md, and nothing else.
+"""Walk on compliant ground by the rules of docs/theory.md, in the simplest possible code.
 
 Masses on levers from the hip, Newton's equations with multipliers for whatever is held, Runge-Kutta's classical method
 with one step for everything, shorter the faster the ground reacts, events by halving that step. It knows nothing of the
@@ -61,7 +61,7 @@ class Plain(NamedTuple):
 
 
 class Now(NamedTuple):
-    """What holds the walker and pushes it."""
+    """The current holds and pushes: pinned foot, locked knees, pulses."""
 
     stance: int
     pinned: int  # foot, or -1
@@ -89,7 +89,7 @@ class Walked(NamedTuple):
 
 
 class Diary(NamedTuple):
-    """What is written on the way."""
+    """Records that the walk writes as it goes."""
 
     times: np.ndarray
     places: np.ndarray
@@ -113,7 +113,7 @@ def straight_legs(leg, foot_to_mass, leg_mass, hip_mass, radius, inertia=0.0):
 
 
 def kneed_legs(thigh, thigh_mass_at, thigh_mass, shank, shank_mass_at, shank_mass, hip_mass, radius):
-    """The same of two legs of thigh (bodies 0, 1) and shank (2, 3); masses at their distance below hip and knee."""
+    """Return the same for two legs of thigh (bodies 0, 1) and shank (2, 3); masses are given below hip and knee."""
     levers, feet = np.zeros((5, 4, 2)), np.zeros((2, 4, 2))
     for k in range(2):
         levers[k, k, 1] = -thigh_mass_at
@@ -143,7 +143,7 @@ def cubic(x, x0, h0, x1, h1):
 
 @njit
 def turned(slope, levers, i, y, k):
-    """One body's part of the way from the hip to a mass or foot."""
+    """Return one body's part of the way from the hip to a mass or foot."""
     a, ahead, up = y[2 + k] + slope, levers[i, k, 0], levers[i, k, 1]
     if ahead == 0.0 and up == 0.0:
         return 0.0, 0.0  # most masses hang on few of the bodies
@@ -152,7 +152,9 @@ def turned(slope, levers, i, y, k):
 
 @njit
 def foot_at(walker, foot, y):
-    """Along, height, velocity of the contact point's material along, velocity of the height, of the contact point."""
+    """Return the contact point's position and height, the foot material's velocity along the ground, the height's rate,
+    and the contact point's velocity.
+    """
     n = walker.inertias.size
     x, h, v, w = y[0], y[1] - walker.radii[foot], y[2 + n], y[3 + n]
     for k in range(n):
@@ -163,7 +165,7 @@ def foot_at(walker, foot, y):
 
 @inner
 def solve(A, b):
-    """Gauss with pivots, in place."""
+    """Solve linear equations in place, by Gauss's method with pivots."""
     size = b.size
     for k in range(size):
         pivot = k
@@ -230,7 +232,7 @@ def matrices(walker, now, y):
 
 @inner
 def push(walker, foot, y, b, along, upward):
-    """Let a force (N) at a foot's contact point act."""
+    """Apply a force (N) at a foot's contact point."""
     b[0] += along
     b[1] += upward
     for k in range(walker.inertias.size):
@@ -319,7 +321,7 @@ def runge_kutta(walker, now, t, y, h):
 
 @inner
 def struck(walker, now, y):
-    """The state after a plastic impact: nothing but the hinge and what is locked takes an impulse."""
+    """Return the state after a plastic impact, in which only the hinge and locked joints take impulses."""
     n = walker.inertias.size
     A, b = matrices(walker, now, y)
     b[:] = 0.0
@@ -358,13 +360,13 @@ def energy(walker, has_ground, levels, y):
 
 @inner
 def material(walker, foot, y):
-    """Where a foot would be had it not rolled."""
+    """Return where a foot would be if it had not rolled."""
     return foot_at(walker, foot, y)[0] + walker.radii[foot] * y[2 + walker.foot_bodies[foot]]
 
 
 @inner
 def lane(walker, foot):
-    """Where pad number 0 of a foot is centred: the swing foot starts a pitch behind the stance foot."""
+    """Return the centre of a foot's pad number 0. The swing foot starts a pitch behind the stance foot."""
     return 0.0 if foot == 1 else -walker.pitch
 
 
@@ -392,7 +394,7 @@ def event_values(walker, now, y, cells, touched):
 
 @inner
 def set_level(walker, levels, side, foot, level, y):
-    """The ground for a foot lies elsewhere now: the foot may find itself in it; returns what its spring held (J)."""
+    """Move the ground under a foot, which may then be inside it. Return the energy (J) that its spring held."""
     held = stored(walker, foot, levels[foot], y) if side[3 * foot] < 0.0 else 0.0
     if level == levels[foot]:
         return 0.0
@@ -647,7 +649,7 @@ def walk(walker, y, steps, h, pinned=-1):
 
 
 def of_centre(walker, y):
-    """The state of a walker of whose hip's place and velocity those of its centre of mass are given."""
+    """Return a walker's state from the position and velocity of its centre of mass instead of the hip's."""
     n, mass = walker.inertias.size, walker.masses.sum()
     moved = np.append(y, [0.0, 0.0])
     for i, m in enumerate(walker.masses):

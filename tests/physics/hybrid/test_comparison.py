@@ -1,4 +1,4 @@
-"""Differences of two walks: in time, in phase, and of their orbits."""
+"""Tests of the differences of two walks: in time, in phase, and of their orbits."""
 
 from dataclasses import replace
 
@@ -95,7 +95,7 @@ def test_step_begins_after_its_impact_and_ends_before_the_next(step):
     assert_allclose(velocity[1], legs_at(np.array([step + 1.0]), -1.0)[1][0] / PERIOD, atol=1e-9)
 
 
-def test_only_steps_that_both_completed_are_compared():
+def test_only_steps_that_both_walks_completed_are_compared():
     assert difference_in_phase(walk(steps=4), walk(), PHASES).angle.shape == (4, PHASES.size, 2)
 
 

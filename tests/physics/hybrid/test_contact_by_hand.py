@@ -1,4 +1,4 @@
-"""The first contact step from the formulas of docs/theory.md, written down anew with the hip as root, and SciPy."""
+"""Compare the first contact step with SciPy's solution of docs/theory.md, written anew with the hip as root."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is recorded of a walk on compliant ground shows the walk, and does not change it."""
+"""Check that the samples of a walk on compliant ground show the walk and do not change it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What does not matter to a walk on compliant ground: place, leg, and the units it is measured in."""
+"""Check that place, leg and units make no difference to a walk on compliant ground."""
 
 import math
 
@@ -12,7 +12,7 @@ from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.scene.contact import start_state
 
 
-def test_start_position_along_the_slope_does_not_matter():
+def test_walk_does_not_depend_on_its_start_along_the_slope():
     scene, here = scene_of(), walked()
     start = np.array(start_state(scene, FIXED_POINT))
     start[0] += 64.0
@@ -24,7 +24,7 @@ def test_start_position_along_the_slope_does_not_matter():
     assert there.outcome is here.outcome
 
 
-def test_starting_leg_does_not_matter():
+def test_walk_does_not_depend_on_the_leg_that_swings_first():
     scene, one = scene_of(), walked()
     y = start_state(scene, FIXED_POINT)
     exchanged = (y[0], y[1], y[3], y[2], y[4], y[5], y[7], y[6])
@@ -64,7 +64,7 @@ def twin(static, dynamic):
     [(1.0, (0.9, 0.7)), (0.9, (0.9, 0.7)), (0.95, (0.9, 0.7)), (1.0, (0.3, 0.2)), (1.0, (0.05, 0.04))],
     ids=["walks", "falls", "trips", "slips", "slides"],
 )
-def test_walker_and_its_scaled_twin_take_the_same_steps(factor, mu):
+def test_walker_and_a_scaled_copy_take_the_same_steps(factor, mu):
     friction = (f"contact.static_friction={mu[0]}", f"contact.dynamic_friction={mu[1]}")
     walk = walked(*friction, start=faster(factor), tolerance=1e-8)
     start = faster(factor)

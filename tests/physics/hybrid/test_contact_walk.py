@@ -1,4 +1,4 @@
-"""Walking on compliant ground: what was measured of this walker by other programs, and what any right one must do."""
+"""Compare walks on compliant ground with measurements by other programs and with laws that hold for any walk."""
 
 import math
 
@@ -56,14 +56,14 @@ def test_lower_stiction_velocity_brings_the_walk_closer_to_the_rigid_one():
 
 
 @pytest.mark.parametrize(("factor", "steps"), [(0.90, 1), (0.95, 5)])
-def test_too_slow_a_start_stumbles(factor, steps):
+def test_start_that_is_too_slow_stumbles(factor, steps):
     walk = walked(start=faster(factor))
     assert walk.outcome in (Outcome.FELL, Outcome.OFF_PAD)
     assert walk.periods_s.size == steps
 
 
 @pytest.mark.parametrize("factor", [1.05, 1.10])
-def test_too_fast_a_start_recovers_to_the_same_gait(factor):
+def test_start_that_is_too_fast_settles_on_the_same_gait(factor):
     walk = walked("contact.terrain=checkerboard", OWN_PITCH, start=faster(factor), steps=24)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(walked(OWN_PITCH, steps=40).periods_s[-1], abs=1e-5)

@@ -1,4 +1,4 @@
-"""The kneed walker on plane compliant ground: what another program measured, momentum, energy, a plain integration."""
+"""Compare the kneed walker on compliant ground with another program, balances and a plain integration."""
 
 import contact_walks
 import numpy as np
@@ -44,7 +44,7 @@ BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
 
 
 def exchanged(walk):
-    """Energy that the ground and the knees took (J)."""
+    """Return the energy (J) that the ground and the knees took."""
     return float(walk.dissipated_J.sum())
 
 
@@ -183,7 +183,7 @@ def test_exact_derivatives_equal_finite_differences(knee):
     np.testing.assert_allclose(J, differences, atol=1e-5 * np.abs(differences).max())
 
 
-def test_scaled_twin_walks_the_same_steps():
+def test_scaled_copy_of_a_kneed_walker_takes_the_same_steps():
     one, other = walked(steps=3, tolerance=1e-9), walked(steps=3, tolerance=1e-9, scale=4.0)
     np.testing.assert_allclose(other.touch_time_s / 2.0, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
@@ -251,14 +251,13 @@ def test_step_derivative_through_lock_and_release_equals_its_slope():
     methods = settings(1e-11)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     z = next(section_points(scene.walker, scene.ground, settings(1e-10), start))[1]
-    at = step_from_section(scene.walker, scene.ground, methods, z, STEP)
+    at = step_from_section(scene, methods, z, STEP)
     assert at.outcome is Outcome.WALKED
     back = coordinates_of(scene.walker, np.array(state_on_section(scene.walker, z, stance)), stance)
     np.testing.assert_allclose(back, z, atol=1e-15)
     for column, step in ((1, 3e-5), (2, 3e-5), (5, 3e-4), (6, 3e-4), (7, 3e-5)):
         ahead, behind = (
-            step_from_section(scene.walker, scene.ground, methods, z + sign * step * np.eye(z.size)[column], STEP).z
-            for sign in (1, -1)
+            step_from_section(scene, methods, z + sign * step * np.eye(z.size)[column], STEP).z for sign in (1, -1)
         )
         slope = (ahead - behind) / (2.0 * step)
         np.testing.assert_allclose(at.DP[:, column], slope, atol=2e-4 * np.abs(at.DP).max())

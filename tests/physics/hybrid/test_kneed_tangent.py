@@ -1,4 +1,4 @@
-"""How a step of a kneed walker on compliant ground changes with its start: exact derivatives against differences."""
+"""Compare derivatives of a kneed walker's step on compliant ground with differences."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_step_derivative_equals_finite_differences(rules):
     _, z = next(section_points(scene.walker, scene.ground, TOLERANCES, start))
 
     def step(z):
-        taken = step_from_section(scene.walker, scene.ground, TOLERANCES, z, STEP)
+        taken = step_from_section(scene, TOLERANCES, z, STEP)
         assert taken.outcome is Outcome.WALKED
         return taken
 

@@ -1,4 +1,4 @@
-"""What the ground takes, and how deep feet get, by closed forms and by looking closely."""
+"""Compare the ground's losses and the depth of feet with closed forms and with dense samples."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Slip is what a foot's material moves; what a ball rolls is no slip."""
+"""Check that slip is the motion of a foot's material, without the rolling of the ball."""
 
 from functools import partial
 

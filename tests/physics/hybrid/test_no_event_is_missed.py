@@ -1,4 +1,4 @@
-"""Events that lie close together are all found, on every terrain; the right answers are a plain integration's."""
+"""Check that events close together are all found on every terrain, against a plain integration."""
 
 from pathlib import Path
 
@@ -145,7 +145,7 @@ def test_event_function_rising_from_zero_leaves_the_negative_side_at_once():
 
 
 def test_knee_strike_time_is_the_same_at_any_tolerance():
-    """Also where the way to it, cut short of the step in which it was seen, takes more than one step."""
+    """This holds even if the last part before it, within the step that found it, takes more than one step."""
     walker = rigid_walker(load(Path("kneed")).config, "corrected")
     start = (*RIGID_ANGLES, *RIGID_RATES)
 

@@ -1,4 +1,4 @@
-"""The page at the top of the hybrid package: it leaves out no event and no file."""
+"""Check that the docstring of the hybrid package names all events and files."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which foot the ground carries once the feet have passed each other, either way: in the air, in the ground, on it."""
+"""Check which foot the ground carries after feet have passed each other, in the air, in the ground, or on it."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ class Feet:
         return self
 
     def passing(self, forward, carried):
-        """The swing foot, which the ground carries or not, comes ahead of the stance foot or ceases to be."""
+        """Let the swing foot, carried by the ground or not, move ahead of the stance foot or fall behind it."""
         self.known.has_ground[SWING_FOOT] = carried
         stance_foot_ahead = 1 if STANCE_FOOT == 1 else -1
         self.known.sides[PASSING] = stance_foot_ahead if forward else -stance_foot_ahead

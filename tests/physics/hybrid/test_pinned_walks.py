@@ -1,4 +1,4 @@
-"""Hinged at its first stance foot, the walker feels the ground under its swing foot as it does with both feet free."""
+"""Check that a walker pinned at its first stance foot feels the ground under its swing foot like a free one."""
 
 from typing import NamedTuple
 

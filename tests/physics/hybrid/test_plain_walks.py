@@ -1,4 +1,4 @@
-"""Random contact walks against the plain integration: a few of scripts/contact_campaign.py."""
+"""Compare random contact walks with the plain integration: a few of scripts/contact_campaign.py."""
 
 import importlib.util
 import sys
@@ -30,7 +30,7 @@ def test_random_walks_agree_with_an_independent_integration(campaign, seed):
 
 @pytest.mark.parametrize("seed", [1, 4, 5, 7, 11])
 def test_driven_walks_agree_with_an_independent_integration(campaign, seed):
-    """By a torque between the legs, and by push-offs, of which one lasts until the knee that it holds is released."""
+    """The drives are a torque between the legs and push-offs, one of which lasts until its held knee is released."""
     one = campaign.compare(campaign.driven(seed), steps=2)
     assert one.wrong == []
     assert one.steps == 2  # the torque has changed legs
@@ -57,7 +57,7 @@ def test_walks_with_bouncing_feet_agree_with_an_independent_integration(campaign
     assert max(one.residuals) < 0.1 * campaign.BALANCED
 
 
-def test_short_campaign_covers_every_ground(campaign):
+def test_short_campaign_covers_every_kind_of_ground(campaign):
     grounds = {campaign.both(seed).ground for seed in SEEDS}
     assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds
     assert any(ground.startswith("kneed") and ground.endswith("pinned") for ground in grounds)

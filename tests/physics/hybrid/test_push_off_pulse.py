@@ -1,4 +1,4 @@
-"""The push-off's pulse on compliant ground: values known, derivatives, energy, and its limit, the rigid impulse."""
+"""Tests of the push-off on compliant ground: known values, derivatives, energy, and the limit of a rigid impulse."""
 
 from pathlib import Path
 
@@ -112,7 +112,7 @@ def test_step_derivative_includes_the_start_time_of_the_pulse(name):
     z = np.array(found.gait.z)
 
     def step(z, derived=False):
-        taken = step_from_section(scene.walker, scene.ground, TIGHT, z, gait.step_length, derived)
+        taken = step_from_section(scene, TIGHT, z, gait.step_length, derived)
         assert taken.outcome is Outcome.WALKED
         return taken
 

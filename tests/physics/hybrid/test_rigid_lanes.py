@@ -1,4 +1,4 @@
-"""Walks in lanes: the same fates, steps and heel strikes as one by one at a tight tolerance, falls among them."""
+"""Check that walks in lanes have the same ends, steps and heel strikes as one by one at a tight tolerance."""
 
 from typing import Any, NamedTuple
 
@@ -70,7 +70,7 @@ def test_ten_steps_end_at_the_reference_state(rtol, error):
 
 
 @pytest.mark.parametrize("walker", [ONE_DEGREE, STEEP, SMALL], ids=["paper", "steep", "small"])
-def test_random_starts_have_the_same_outcome_in_lanes_and_alone(walker):
+def test_random_starts_end_equally_in_lanes_and_in_single_walks(walker):
     starts = random_starts(walker, 200)
     fates, strikes = in_lanes(walker, starts, 1e-11)  # on the steep slope errors grow with every step
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
@@ -83,7 +83,7 @@ def test_random_starts_have_the_same_outcome_in_lanes_and_alone(walker):
     assert {Outcome.FELL, Outcome.REJECTED} <= set(fates.outcome.tolist())
 
 
-def test_starts_near_a_gait_walk_the_same_in_lanes_and_alone():
+def test_starts_near_a_gait_walk_equally_in_lanes_and_in_single_walks():
     generator = np.random.default_rng(3)
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
@@ -115,7 +115,7 @@ def test_overflow_ends_the_walk():
     assert Outcome(int(fates.outcome[0])) in (Outcome.SOLVER_FAILED, Outcome.BUDGET_EXHAUSTED)
 
 
-def test_driven_walks_are_the_same_in_lanes_and_alone():
+def test_driven_walks_are_equal_in_lanes_and_in_single_walks():
     driven = assembled(ONE_DEGREE).changed(hip=(5.0, 0.1, 0.5), push_off=1.0)
     starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
     fates, strikes = model_in_lanes(driven, starts, 1e-10)

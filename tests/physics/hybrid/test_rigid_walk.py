@@ -1,4 +1,4 @@
-"""Walks of the rigid model against a reference agreed by two tools, and against SciPy with events of its own."""
+"""Compare rigid walks with a reference on which two tools agree, and with SciPy, which has events of its own."""
 
 import numpy as np
 import pytest
@@ -233,7 +233,7 @@ def test_standing_with_legs_together_is_not_a_heel_strike():
     assert walk.outcome is Outcome.NO_HEEL_STRIKE
 
 
-def test_far_from_excludes_samples_near_events():
+def test_samples_near_events_are_excluded():
     times = np.array([0.0, 0.99, 1.0, 1.02, 2.0, 3.5])
     assert far_from(times, np.array([1.0, 2.01]), 0.015).tolist() == [True, False, False, True, False, True]
     assert far_from(times, np.zeros(0), 1.0).all()

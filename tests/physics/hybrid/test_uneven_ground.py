@@ -1,4 +1,4 @@
-"""Walks over footholds of different heights: against a library's integrator, differences, energy, and each other."""
+"""Compare walks over footholds of different heights with a library's integrator, differences and energy."""
 
 from pathlib import Path
 
@@ -90,7 +90,7 @@ def test_landing_less_than_a_quarter_step_ahead_is_not_a_step(name, share, seed)
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
 
 
-def test_walk_on_even_ground_has_no_shortest_landing():
+def test_minimum_landing_distance_does_not_affect_a_walk_on_even_ground():
     _, walker, gait = gait_of("slope-3deg")
     even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
     np.testing.assert_array_equal(even.after, judged.after)
@@ -116,7 +116,7 @@ def test_tangents_over_uneven_steps_equal_finite_differences(name):
 
 
 def test_work_of_gravity_on_uneven_ground_includes_height_changes():
-    """And so does the cost of transport: what the walker descends is spent."""
+    """The cost of transport includes them as well: what the walker descends is spent."""
     _, walker, gait = gait_of("paper")
     weight = walker.mass * walker.gravity
     for height in (-5e-4, 5e-4):
@@ -136,7 +136,7 @@ def test_feet_land_at_the_heights_of_their_footholds():
     np.testing.assert_array_equal(walk.foothold_height_m, heights[1:])
 
 
-def test_heights_of_zero_change_no_bit():
+def test_foothold_heights_of_zero_change_no_bit_of_a_rigid_walk():
     _, walker, gait = gait_of("kneed")
     even, level = (take_walk(walker, TIGHT, gait.state, 3, heights=heights) for heights in (None, np.zeros(4)))
     np.testing.assert_array_equal(even.after, level.after)
@@ -181,7 +181,7 @@ def test_contact_walk_over_heights_balances_energy_and_stays_near_the_rigid_one(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_zero_heights_equal_even_ground_bit_for_bit(case):
+def test_contact_walk_over_heights_of_zero_equals_even_ground_bit_for_bit(case):
     name, terrain = CASES[case]
     _, even = on_terrain(name, terrain, None, steps=3)
     _, level = on_terrain(name, terrain, np.zeros(1), steps=3)
@@ -189,7 +189,7 @@ def test_zero_heights_equal_even_ground_bit_for_bit(case):
 
 
 def test_stiffer_uneven_ground_brings_the_contact_walk_closer_to_the_rigid_one():
-    """Led towards the limit as tune does: stiffness, its root the damping, and slower creep."""
+    """The series to the limit is that of `tune`: stiffness, damping as its root, and slower creep."""
     config, walker, gait = gait_of("slope-3deg")
     heights, law = np.array([0.0, -2e-3, 1e-3, -1e-3, -1e-3]), config.contact
     rigid = take_walk(walker, TIGHT, gait.state, 3, heights=heights[:-1])
@@ -338,7 +338,7 @@ def test_last_listed_height_repeats_and_random_heights_do_not_depend_on_their_co
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
 def test_fall_is_judged_by_the_hip_height_above_the_foothold(leg):
-    """Stairs that lead down by a leg's length are walked: nothing falls but the ground."""
+    """The walker walks down stairs by a leg's length: only the ground falls."""
     _, walker, gait = gait_of("slope-3deg")
     heights = np.append(0.0, -1e-3 * np.arange(1, 701)) if leg == SWING else np.append(0.0, 1e-4 * np.arange(1, 701))
     walk = take_walk(walker, Tolerances("dop853", 1e-9, 1e-11, 10**8), gait.state, 700, heights=heights)

@@ -1,4 +1,4 @@
-"""A walker with a torso and a knee: described by its parts, and by the positions of its masses typed by hand."""
+"""A walker with a torso and a knee, described by its parts and by the positions of its masses."""
 
 import sympy as sp
 

@@ -1,4 +1,4 @@
-"""The compass walker assembled from its parts, against Appendix A of the paper and against the rigid model."""
+"""Compare the compass assembled from its parts with Appendix A of the paper and with the rigid model."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Any tree: a walker with torso and knee against Lagrange's equations, and what a body in free flight keeps."""
+"""Compare a tree with torso and knee with Lagrange's equations, and check the invariants of free flight."""
 
 import numpy as np
 import pytest

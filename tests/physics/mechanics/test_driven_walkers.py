@@ -1,4 +1,4 @@
-"""Torques at the hip and the push-off, by a route that does not use them: random walkers mass by mass."""
+"""Compare hip torques and the push-off of random walkers with equations written mass by mass."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ hips = st.builds(
 
 
 def driven(test):
-    """The test for random walkers of one type at a time, on slopes either way, with random drives and states."""
+    """Run the test for random walkers of one type at a time, on slopes either way, with random drives and states."""
 
     @each_type
     @settings(max_examples=EXAMPLES)
@@ -52,7 +52,7 @@ def driven(test):
 
 
 def apart(model, y):
-    """How far the swing leg is ahead, and how fast it gets further (rad, rad/s)."""
+    """Return how far the swing leg is ahead (rad), and the rate (rad/s)."""
     n = len(model.arm_x)
     return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]
 

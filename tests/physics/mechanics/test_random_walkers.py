@@ -1,4 +1,4 @@
-"""Random walkers of each type: energy, momentum, mirror image, scale, and parts against types; nothing is compiled."""
+"""Check energy, momentum, mirror images and scaling of random walkers of each type, without compiling."""
 
 from dataclasses import replace
 
@@ -77,7 +77,7 @@ each_type = pytest.mark.parametrize("kind", TYPES)
 
 
 def for_each_type(test):
-    """The test for random walkers, slopes and states of one type at a time."""
+    """Run the test for random walkers, slopes and states of one type at a time."""
 
     @each_type
     @settings(max_examples=EXAMPLES)
@@ -91,7 +91,7 @@ def for_each_type(test):
 
 
 def state_of(model, phase, free):
-    """Angles and velocities of a swing, followers in their places."""
+    """Return angles and velocities of a swing, with followers placed by their coupling."""
     n = len(model.arm_x)
     padded = (*free[:3], 0.0)
     return state_linked(model, phase, (*padded[:n], *(*(3.0 * x for x in free[3:]), 0.0)[:n]))
@@ -249,7 +249,7 @@ def test_mirrored_walker_moves_as_the_mirror_image(assembly, slope, free):
 
 
 @for_each_type
-def test_scaled_twin_takes_the_same_steps(assembly, slope, free):
+def test_scaled_copy_of_a_walker_takes_the_same_steps(assembly, slope, free):
     long, heavy = 3.7, 0.2
     model = rigid_on_slope(assembly, G, slope)
     twin = rigid_on_slope(

@@ -1,4 +1,4 @@
-"""Walkers on one foot against Lagrange's equations and sums over their masses, both written down from positions."""
+"""Compare walkers on one foot with Lagrange's equations and with sums over their masses."""
 
 import numpy as np
 import pytest
@@ -172,7 +172,9 @@ def angular_momentum(parts, spins, about):
 
 @given(st.tuples(angle, rate, rate))
 def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
-    """Of the whole about the new contact point; of the trailing leg about the hip, and half of the torso's."""
+    """These are the whole walker's about the new contact point, and the trailing leg's with half of the torso's about
+    the hip.
+    """
     stance, d_stance, d_thigh = numbers
     thigh = -2.0 * (SLOPE + KNEED.lean) - stance
     y = kneed_state((thigh, stance, thigh, d_thigh, d_stance, d_thigh))
@@ -280,7 +282,7 @@ def test_both_feet_touch_if_the_legs_lean_symmetrically(leg):
     (1, lambda e: straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc(e))),
     (1, lambda e: add_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), e, 0.3, 0.0)),
 ])  # fmt: skip
-def test_vanishing_radius_and_torso_leave_the_compass(order, walker):
+def test_walker_with_vanishing_foot_radius_and_torso_equals_the_compass(order, walker):
     """Radius and torso mass: the rates of the legs come back linearly."""
     y = (0.2, -0.1, -0.8, -1.1)
     compass = rigid_on_slope(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
@@ -307,8 +309,8 @@ def compiled_strikes(model, y, heel, knee):
 
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
-def test_compiled_code_reads_no_uninitialised_scratch(phase):
-    """In Python unwritten scratch is no number, and what is compiled says the same."""
+def test_compiled_code_reads_no_uninitialised_memory(phase):
+    """In Python unwritten scratch is NaN, and compiled code gives the same results."""
     y = np.random.default_rng(1).uniform(-0.5, 0.5, 24)
     results = []
     for rate, strikes in ((compiled, compiled_strikes), (uncompiled(compiled), uncompiled(compiled_strikes))):
@@ -319,7 +321,7 @@ def test_compiled_code_reads_no_uninitialised_scratch(phase):
     np.testing.assert_allclose(results[0], results[1], rtol=1e-11, atol=1e-11)
 
 
-def test_walking_does_not_modify_the_walker():
+def test_simulating_a_walk_does_not_modify_the_walker():
     with pytest.raises(ValueError, match="read-only"):
         KNEED.slope = 0.1
     steeper = KNEED.changed(slope=0.1)

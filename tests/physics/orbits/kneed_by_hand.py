@@ -1,4 +1,4 @@
-"""A step of a kneed walker with a torso on the legs' bisector, by Lagrange's equations and SciPy alone.
+"""A step of a kneed walker whose torso bisects its legs, by Lagrange's equations and SciPy alone.
 
 Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points, perhaps ahead
 of the shank's line. Bodies: swing
@@ -29,7 +29,9 @@ class Walker(NamedTuple):
 
 
 def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
-    """From (length, mass, below, ahead, inertia) of thigh and shank and (mass, above, inertia) of the torso."""
+    """Build a walker from (length, mass, below, ahead, inertia) of thigh and shank and (mass, above, inertia) of the
+    torso.
+    """
     upper, _, below_hip, thigh_ahead, _ = thigh
     lower, _, below_knee, shank_ahead, _ = shank
     leg = upper + lower
@@ -46,13 +48,13 @@ def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
 
 
 def mass_matrix(walker, theta):
-    """Of the bodies' angles (4,), and the velocities of the masses by their rates."""
+    """Return the mass matrix for the bodies' angles (4,), and the masses' velocities per rate."""
     J = 1j * walker.arms * np.exp(1j * theta)
     return (J.conj().T * walker.masses @ J).real + np.diag(walker.inertias), J
 
 
 def accelerations(walker, free, theta, omega):
-    """Of the bodies, whose rates are `free` times those of the free ones."""
+    """Return the accelerations of the bodies, whose rates are `free` times the rates of the free ones."""
     M, J = mass_matrix(walker, theta)
     turning = 1j * J @ omega**2
     forces = (J.conj().T @ (walker.masses * (-1j * walker.gravity - turning))).real
@@ -60,7 +62,7 @@ def accelerations(walker, free, theta, omega):
 
 
 def swung(walker, free, y, t, event, longest=10.0):
-    """Time and state at an event, from y (8,) at t on."""
+    """Return time and state at an event, integrating y (8,) from t."""
 
     def rates(_t, y):
         return np.concatenate((y[4:], accelerations(walker, free, y[:4], y[4:])))
@@ -73,7 +75,7 @@ def swung(walker, free, y, t, event, longest=10.0):
 
 
 def step(walker, z):
-    """Where z (3,) leads, how long it takes, and when the knee strikes (s)."""
+    """Return the end of the step from z (3,), its duration, and the time of the knee strike (s)."""
     tilt = 2.0 * (walker.slope + walker.lean)
     swing, stance = -tilt - z[0], z[0]
     y = np.array([swing, stance, swing, -0.5 * tilt, z[1], z[2], z[1], 0.5 * (z[1] + z[2])])

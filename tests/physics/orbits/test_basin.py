@@ -1,4 +1,4 @@
-"""Basins: attractors found by walking, cells that agree with walks one by one, edges, windows."""
+"""Tests of basins: attractors found by walking, edges, windows, and cells that agree with single walks."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The contact gait against walking, energy and momentum: routes that Newton's method does not use."""
+"""Check the contact gait by walking, energy and momentum, which Newton's method does not use."""
 
 from dataclasses import replace
 from pathlib import Path

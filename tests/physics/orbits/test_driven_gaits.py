@@ -1,4 +1,4 @@
-"""Gaits of driven walkers: published ones, those of the level, and passive gaits that torques turn."""
+"""Tests of driven gaits: published ones, gaits on the level, and passive gaits changed by torques."""
 
 import math
 from pathlib import Path
@@ -168,7 +168,7 @@ DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)}}
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_energies_of_a_driven_walk_balance(name):
-    """And what is given in a gait's step is what its strikes take; a spring gives back what it takes."""
+    """The heel strikes of a gait take what a step is given; a spring returns what it takes."""
     walker = change_slope(walker_of(name, **DRIVES[name]), 0.0)
     gait = find_gaits(walker).gait
     weight = walker.mass * walker.gravity * walker.leg_length
@@ -210,7 +210,7 @@ def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
 
 
 def test_cost_derivative_across_a_knee_strike_equals_an_independent_slope():
-    """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
+    """The parameter is the hip's spring, and the knee strike reverses the rate between the thighs."""
 
     def driven(spring):
         return change_slope(walker_of("kneed", push_off=0.2, hip=(spring, 0.0, 0.3)), 0.0)

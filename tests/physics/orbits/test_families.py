@@ -1,4 +1,4 @@
-"""Families of gaits: flips by another route, cascades, folds, and what is said where a branch ends."""
+"""Tests of families of gaits: flips by another method, cascades, folds, and the reported ends of branches."""
 
 from functools import cache
 from itertools import pairwise
@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.attractors import (
     standard_error,
     sweep_attractor,
 )
-from walkerlab.physics.orbits.bifurcations import GaitEquations, bialternate_product
+from walkerlab.physics.orbits.bifurcations import GaitEquations, bialternate_product, eigenvector
 from walkerlab.physics.orbits.continuation import CurvePoint, Segment, StepControl, correct, root_along, step_along
 from walkerlab.physics.orbits.families import (
     NO_WALKER,
@@ -133,7 +133,7 @@ def impact_by_momenta(y):
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def velocities(omega, standing):
-        """Of the hip and of both leg masses, with one foot at rest."""
+        """Return the velocities of the hip and of both leg masses, with one foot at rest."""
         hip = -L * omega[standing] * (turn @ hip_to_foot[standing])
         return hip, [hip + (L - A) * omega[k] * (turn @ hip_to_foot[k]) for k in range(2)]
 
@@ -249,7 +249,7 @@ def test_every_point_of_a_branch_has_its_minimal_period():
             assert all(np.max(np.abs(step.z - point.z)) > 1e-6 for step in cycle.steps[:-1])
 
 
-def test_branches_are_stable_between_bifurcations_and_end_with_the_span():
+def test_stability_changes_only_at_bifurcations_and_branches_end_at_the_span():
     branches = compass_family()
     flips = flips_of(branches)
     stable = next(b for b in branches if b.period == 1 and b.stable_ranges)
@@ -283,7 +283,7 @@ def between_the_first_flip_and_the_branch_beyond_it():
     return follower, Seed(walked.last, slope, 2)
 
 
-def test_gait_just_beyond_a_flip_is_on_the_new_branch():
+def test_gait_just_beyond_a_flip_is_on_the_doubled_branch():
     follower, seed = between_the_first_flip_and_the_branch_beyond_it()
     known = compass_family()
     assert follower.family([seed], 2, known) == known
@@ -333,7 +333,7 @@ def test_lyapunov_exponent_is_positive_in_chaos_and_negative_on_a_stable_gait():
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
 def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
-    """Of means of normal noise whose correlation falls e-fold in so many steps: the mean is 0."""
+    """The means are those of normal noise with mean 0, whose correlation falls e-fold in some number of steps."""
     kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
     for step in range(1, noise.shape[1]):
         noise[:, step] += kept * noise[:, step - 1]
@@ -344,7 +344,7 @@ def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
     assert np.mean(np.array(off) > 2.0) < 0.077 + 2.0 * np.sqrt(0.077 * 0.923 / 400)
 
 
-def test_exponent_agrees_with_that_of_a_walk_fifty_times_longer():
+def test_lyapunov_exponent_agrees_with_a_walk_fifty_times_longer():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.0, 0.1))
     start = seeds_at(paper_walker, 0.07)[-1].z  # the longer gait, stable there
     attractor = sweep_attractor(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
@@ -354,7 +354,7 @@ def test_exponent_agrees_with_that_of_a_walk_fifty_times_longer():
 
 
 @pytest.mark.parametrize("beyond", [2e-6, 1.6e-5])
-def test_exponent_just_beyond_a_flip_is_negative(beyond):
+def test_lyapunov_exponent_just_beyond_a_flip_is_negative(beyond):
     step_map = map_of(paper_walker, 0.1)
     two = next(b for b in compass_family() if b.period == 2 and b.stable_ranges)
     flip = next(one for one in two.bifurcations if one.kind == "flip")
@@ -499,6 +499,19 @@ def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     found = np.linalg.eigvals(bialternate_product(DP))
     assert np.max([np.min(np.abs(found - product)) for product in products]) < 1e-10
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
+
+
+def test_a_complex_pair_gives_a_direction_in_its_own_plane():
+    """Also if another multiplier equals the pair's real part, which is then nearest to being singular."""
+    pair = 1.2 * np.exp(1j)
+    basis = np.random.default_rng(0).normal(size=(3, 3))
+    turning = np.array([[pair.real, -pair.imag, 0.0], [pair.imag, pair.real, 0.0], [0.0, 0.0, pair.real]])
+    A = basis @ turning @ np.linalg.inv(basis)
+    direction = eigenvector(A, pair)
+    assert np.linalg.norm(direction) > 0.5
+    # in the plane, A satisfies the pair's own quadratic equation
+    squared = A @ A @ direction - 2.0 * pair.real * A @ direction + abs(pair) ** 2 * direction
+    assert squared == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 def test_only_repeating_sequences_have_a_period():

@@ -1,4 +1,4 @@
-"""Gaits against numbers known from elsewhere, and what every search must hold to."""
+"""Compare gaits with numbers known from elsewhere, and check the rules of every search."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -53,7 +53,7 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-15, 10**5)
 
 
 class Counted(RigidStepper):
-    """A step map that counts what it costs."""
+    """A step map that counts its own steps."""
 
     def __init__(self, like, tolerances):
         super().__init__(like, tolerances)
@@ -71,7 +71,7 @@ def shooting(walker):
 
 
 def solve(shooting, walker, z, tolerance):
-    """By Newton's method for a walker in its own units, so that a step counts what it costs."""
+    """Run Newton's method for a walker in its own units, counting steps."""
     section = strike_section(assembled(walker))
 
     def mismatch(z):
@@ -366,7 +366,7 @@ def test_gaits_of_random_walkers_are_periodic(fraction, hip, inertia, degrees, s
         assert np.abs(step.z[0] - z).max() < 1e-11 * np.sqrt(9.81)
 
 
-def test_newton_gives_up_if_no_step_is_taken():
+def test_newton_gives_up_if_the_walker_completes_no_step():
     map_ = shooting(PAPER)
     found = solve(map_, PAPER, [0.17, 3.0, 3.0], 1e-12)
     assert isinstance(found, NotConverged)

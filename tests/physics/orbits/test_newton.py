@@ -1,4 +1,4 @@
-"""Newton's method by itself: what it halves, when it stops, and what it says where it finds nothing."""
+"""Tests of Newton's method: when it halves its steps, when it stops, and what it reports if it finds nothing."""
 
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ MCGEER = straight_legs(Limb(1.0, 1.0, 0.37, 0.0, 0.32**2), 0.0, Arc(0.3))
 SIMPLEST = straight_legs(Limb(1.0, 1e-12, 1.0), 1.0, Arc())
 HSU_CHEN = kneed_legs(Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5, Arc())
 # parts, slope, gravity; stance angle from the slope's normal, rates of stance and swing leg; period; multipliers.
-# Wisse, Schwab (2003); McGeer (1990), section 5; Garcia et al. (1998); Hsu Chen (2007). Digits recomputed by two
+# Wisse (2003), MATLAB files; McGeer (1990), section 5; Garcia et al. (1998); Hsu Chen (2007). Digits recomputed by two
 # independent routes; the printed ones of Hsu Chen (.2381, -1.1014, -.0399) err in the third place.
 PUBLISHED = {
     "round feet": (

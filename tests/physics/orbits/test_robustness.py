@@ -1,4 +1,4 @@
-"""Sensitivity norms, largest steps and rough ground against published values, brute sums and theory; gradients."""
+"""Compare sensitivity norms, largest steps and rough ground with published values, sums and theory."""
 
 import math
 from pathlib import Path
@@ -48,7 +48,7 @@ def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):
 
 
 def on_compliant_ground(name, key="slope_rad", changes=()):
-    """The same on the contact model's section, off its pads."""
+    """Return the same on the contact model's section, off its pads."""
     config = load(Path(name), changes).config
     rigid = standpoint(name, changes=changes)
     walker = rigid_walker(config, config.equations)
@@ -259,7 +259,7 @@ def test_gradients_equal_differences_of_converged_gaits(name, key):
 
 @pytest.mark.parametrize(("name", "key"), [("paper", "walker.foot_to_mass_m"), ("kneed", "walker.hip_mass_kg")])
 def test_gradients_on_compliant_ground_equal_differences_of_converged_gaits(name, key):
-    """Also by measures that put a foot of the same section coordinates in the air, or millimetres deep."""
+    """This includes measures that put a foot of the same section coordinates in the air, or millimetres deep."""
     at = on_compliant_ground(name, key)
     wanted = ("period_s", "step_length_m", "speed_m_s", "spectral_radius")
     found = gradients(at, abs(at.p), wanted)
@@ -291,7 +291,7 @@ def test_gravity_only_rescales_time():
     assert of_itself["gait_sensitivity_norm"] == pytest.approx(-0.5, abs=1e-6)
 
 
-def test_difference_quotient_is_of_fourth_order_and_one_sided_at_a_wall():
+def test_difference_quotient_has_order_four_and_is_one_sided_at_a_bound():
     for wall in (-np.inf, -1e-12):
         off = [
             derivative(lambda x, wall=wall: np.array([math.exp(x)]) if x > wall else None, h)[0] - 1.0

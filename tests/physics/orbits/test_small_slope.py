@@ -1,4 +1,4 @@
-"""The small-slope theory against published numbers and against gaits solved at small slopes."""
+"""Compare the small-slope theory with published numbers and with gaits on small slopes."""
 
 import numpy as np
 import pytest

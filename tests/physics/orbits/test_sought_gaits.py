@@ -1,4 +1,4 @@
-"""Gaits that are hard to come by: those that nothing is led to, and what is said where a search finds none."""
+"""Tests of gaits that are hard to find, and of the messages if a search finds none."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Derivatives of the step maps, from variational equations, against differences of the maps; and Newton with them."""
+"""Compare derivatives of the step maps, by variational equations, with differences, and use them in Newton's method."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -40,7 +40,7 @@ def slope_of(ends, z, steps):
 
 
 def is_quadratic(residuals):
-    """Each residual is of the order of the square of the one before, down to rounding; three of them at least."""
+    """Whether each of at least three residuals is of the order of the square of the one before, down to rounding."""
     seen = [residual for residual in residuals if residual > ROUNDING]
     factors = [after / before**2 for before, after in pairwise(seen)]
     return len(seen) >= 3 and max(factors) < 100.0
@@ -62,7 +62,7 @@ def unit_map(walker):
 
 
 def beside_the_gait(walker, offset):
-    """The coordinates of a walker's gait, those of its unit walker, with an offset."""
+    """Return the coordinates of a walker's gait, in those of its unit walker, with an offset."""
     in_units = [1.0] + [unit_walker(assembled(walker))[1].time] * 2
     return in_units * np.add(find_gaits(walker).gait.state[1:], OFF_THE_GAIT[offset])
 
@@ -70,7 +70,7 @@ def beside_the_gait(walker, offset):
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
 @pytest.mark.parametrize("name", WALKERS)
 def test_rigid_step_derivative_equals_its_slope(name, offset):
-    """Through the swing by the variational equations, through the heel strike by the saltation."""
+    """It goes through the swing by the variational equations, and through the heel strike by the saltation matrix."""
     walker = WALKERS[name]
     step_map, z = unit_map(walker), beside_the_gait(walker, offset)
 
@@ -112,20 +112,20 @@ def scene():
 
 def stepped(scene, z, tolerance):
     tolerances = Tolerances("radau5", tolerance, 1e-2 * tolerance, 10**6)
-    step = step_from_section(scene.walker, scene.ground, tolerances, z, PITCH)
+    step = step_from_section(scene, tolerances, z, PITCH)
     assert step.outcome is Outcome.WALKED
     return step
 
 
 @pytest.mark.parametrize("z", [NEAR_THE_GAIT, NEAR_THE_GAIT + ASIDE], ids=["at the gait", "off it"])
 def test_contact_step_derivative_equals_finite_differences(scene, z):
-    """Through touches, releases and every other switching point of the force law, where the Jacobian jumps."""
+    """It goes through touches, releases and all other switching points of the force law, where the Jacobian jumps."""
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, z, STEPS)
     np.testing.assert_allclose(stepped(scene, z, 1e-12).DP, slope, rtol=0.0, atol=AGREEMENT)
 
 
 def test_contact_derivative_converges_with_the_tolerance(scene):
-    """A join that is passed on the wrong side shows as a derivative that does not."""
+    """The derivative does not converge if a switching point is passed on the wrong side."""
     exact = stepped(scene, NEAR_THE_GAIT, 1e-12).DP
     errors = [np.abs(stepped(scene, NEAR_THE_GAIT, tolerance).DP - exact).max() for tolerance in (1e-9, 1e-11)]
     assert errors[0] < 1e-5

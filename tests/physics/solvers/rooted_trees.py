@@ -1,4 +1,4 @@
-"""Conditions on a Runge-Kutta tableau, one for each rooted tree; Butcher; Hairer, Norsett, Wanner I, section II.2."""
+"""Order conditions of a Runge-Kutta tableau, one for each rooted tree (Butcher; Hairer, Norsett, Wanner I, II.2)."""
 
 import math
 from functools import cache
@@ -40,5 +40,5 @@ def stage_weights(A, tree):
 
 
 def defects(A, weights, order):
-    """How far each condition of an order is from being met."""
+    """Return how far each condition of an order is from being met."""
     return [weights @ stage_weights(A, tree) - 1.0 / density(tree) for tree in trees(order)]

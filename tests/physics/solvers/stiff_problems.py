@@ -1,4 +1,4 @@
-"""Stiff and smooth problems as systems, where the stiff ones end, and a kernel that drives Radau through them."""
+"""Stiff and smooth problems, the ends of the stiff ones, and a kernel that solves them with Radau."""
 
 import math
 from typing import Any, NamedTuple

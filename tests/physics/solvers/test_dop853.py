@@ -1,4 +1,4 @@
-"""DOP853: its tableau, the orders it shows, a published orbit, and SciPy's version of it."""
+"""Tests of DOP853: its tableau, its orders, a published orbit, and SciPy's version of it."""
 
 import math
 from typing import NamedTuple
@@ -34,13 +34,12 @@ from walkerlab.physics.solvers.system import block, derivative
 
 def matrix(stages):
     A = np.zeros((stages, stages))
-    for s in range(2, stages + 1):
-        row = getattr(tableau, f"A_{s}")
-        A[s - 1, : len(row)] = row
+    for s, row in enumerate(tableau.A[:stages]):
+        A[s, : len(row)] = row
     return A
 
 
-A, B, C = matrix(12), np.array(tableau.A_13), np.array(tableau.NODES[:12])
+A, B, C = matrix(12), np.array(tableau.A[12]), np.array(tableau.NODES[:12])
 
 
 def defects(weights, order):
@@ -53,7 +52,7 @@ def test_number_of_trees_agrees_with_cayley():
 
 def test_tableau_nodes_equal_the_row_sums_of_their_stages():
     assert A.sum(axis=1) == pytest.approx(C, abs=1e-14)
-    extra = [sum(getattr(tableau, f"A_{s}")) for s in (14, 15, 16)]
+    extra = [sum(row) for row in tableau.A[13:]]
     assert extra == pytest.approx(tableau.NODES[13:16], abs=1e-14)
 
 
@@ -124,7 +123,10 @@ def arenstorf_derivative(system, t, y, f):
 
 @kernel
 def integrate(method, system, y, t_end, h, fraction, sample):
-    """From 0 to t_end in steps of h, or of the method's choice; the last step's dense output at `fraction` is kept."""
+    """Integrate from 0 to t_end in steps of h, or of the method's choice.
+
+    Keep the last step's dense output at `fraction`.
+    """
     begin(method, system, 0.0, y, h)
     status = STEP_DONE
     while method.clock[T] < t_end and status == STEP_DONE:
@@ -235,7 +237,7 @@ def test_solution_with_a_singularity_stops_at_the_smallest_step():
 
 @kernel
 def there_and_back(method, system, y, h, middle, back):
-    """One step, taken back, and half of it taken again."""
+    """Take a step, take it back, and take half of it again."""
     begin(method, system, 0.0, y, h)
     advance(method, system, 1e9)
     prepare_dense(method, system)
@@ -256,7 +258,7 @@ def test_step_can_be_repeated_up_to_an_event():
 
 
 class Twice(NamedTuple):
-    """The pair two times behind each other: more numbers than a block holds."""
+    """The pair twice in one state, which is larger than a block."""
 
 
 @block.case(Twice)

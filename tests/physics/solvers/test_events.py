@@ -1,4 +1,4 @@
-"""Crossings of polynomials whose roots are known: all of them, in order, and none that are not there."""
+"""Check that exactly the known roots of polynomials are found, in order."""
 
 import numpy as np
 import pytest

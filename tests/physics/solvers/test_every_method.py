@@ -1,4 +1,4 @@
-"""What holds for every method of the registry; a new one is covered as soon as it is listed."""
+"""Tests of all methods in the registry. A new one is tested as soon as it is listed."""
 
 import math
 from functools import cache
@@ -104,7 +104,7 @@ def once_more(method, system, t_end):
 
 
 def called(name, function, *arguments):
-    """A kernel as the walks call it: compiled for our own methods, in Python for a library's."""
+    """Call a kernel as walks do: compiled for our own methods, in Python for a library's."""
     return (function if METHODS[name].compiled else function.py_func)(*arguments)
 
 
@@ -115,7 +115,7 @@ def driven(name, rtol, t_end, budget=PLENTY):
 
 @cache
 def growth(t):
-    """How much larger a change of the start has become by a time, at most: 3e3 after a tenth of the orbit."""
+    """Return the largest factor by which a change of the start has grown by a time: 3e3 after a tenth of the orbit."""
     change = 1e-9
     ends = [drive_to(t, START + sign * change * unit) for unit in np.eye(4) for sign in (1.0, -1.0)]
     columns = [(up - down) / (2.0 * change) for up, down in zip(ends[::2], ends[1::2], strict=True)]
@@ -189,7 +189,7 @@ def circled(name, rtol):
 
 @pytest.fixture(scope="module")
 def early():
-    """The satellite after a tenth of its period, by the most exact of all."""
+    """Return the satellite after a tenth of its period, by the most accurate method."""
     return driven("dop853", 1e-14, 0.1 * PERIOD)[0].y.copy()
 
 

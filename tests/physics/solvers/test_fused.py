@@ -1,4 +1,4 @@
-"""Products and sums rounded once."""
+"""Tests of products and sums that are rounded only once."""
 
 from fractions import Fraction
 
@@ -18,7 +18,7 @@ def compiled(a, b, c):
 
 
 @given(numbers, numbers, numbers)
-def test_compiled_fma_rounds_once(a, b, c):
+def test_compiled_fused_multiply_add_rounds_once(a, b, c):
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     assert compiled(a, b, c) == float(exact)
 

@@ -1,4 +1,4 @@
-"""Numbers in lanes: what is compiled for floats means the same, lane by lane."""
+"""Check that code compiled for lanes does in each lane what it does for a float."""
 
 import math
 import subprocess
@@ -19,9 +19,9 @@ from walkerlab.physics.solvers.lanes import (
     choose,
     derivative,
     fused,
-    load_lanes,
+    load,
     nearest,
-    store_lanes,
+    store,
     teach_arithmetic,
 )
 
@@ -32,27 +32,27 @@ teach_arithmetic()
 
 @kernel
 def arithmetic(x, out):
-    a, b = load_lanes(x, 0), load_lanes(x, 1)
-    store_lanes(2.0 * a - b / a + 1, out, 0)
-    store_lanes(fused(a, -b, 3.0), out, 1)
-    store_lanes(max(a, b, 0.5) * min(a, -b), out, 2)
-    store_lanes(math.sqrt(abs(a)) + nearest(b), out, 3)
-    store_lanes(choose(a - b, a, 7.0), out, 4)
+    a, b = load(x, 0), load(x, 1)
+    store(2.0 * a - b / a + 1, out, 0)
+    store(fused(a, -b, 3.0), out, 1)
+    store(max(a, b, 0.5) * min(a, -b), out, 2)
+    store(math.sqrt(abs(a)) + nearest(b), out, 3)
+    store(choose(a - b, a, 7.0), out, 4)
     return any_positive(a - 10.0), any_positive(a)
 
 
 @kernel
 def sines(x, out):
-    sine, cosine = sine_cosine(load_lanes(x, 0))
-    store_lanes(sine, out, 0)
-    store_lanes(cosine, out, 1)
+    sine, cosine = sine_cosine(load(x, 0))
+    store(sine, out, 0)
+    store(cosine, out, 1)
 
 
 @kernel
 def rates(system, y, out):
-    rate = derivative(system, 0.0, (load_lanes(y, 0), load_lanes(y, 1), load_lanes(y, 2), load_lanes(y, 3)))
+    rate = derivative(system, 0.0, (load(y, 0), load(y, 1), load(y, 2), load(y, 3)))
     for i in range(4):
-        store_lanes(rate[i], out, i)
+        store(rate[i], out, i)
 
 
 IMPORT_ALL = """

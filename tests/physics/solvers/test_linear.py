@@ -1,4 +1,4 @@
-"""LU factors with row exchanges, real and complex, against NumPy; compiled they are at work in every Radau test."""
+"""Compare LU factors with row exchanges, real and complex, with NumPy. Every Radau test uses them compiled."""
 
 import numpy as np
 import pytest

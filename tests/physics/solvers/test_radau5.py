@@ -1,4 +1,4 @@
-"""Radau IIA: its stability function, the orders it shows, published stiff problems, and SciPy's version of it."""
+"""Tests of Radau IIA: its stability function, its orders, published stiff problems, and SciPy's version of it."""
 
 import math
 from typing import Any
@@ -77,7 +77,7 @@ def linear(z):
 
 
 def one_step(z):
-    """What a step of length 1 makes of y' = z y, y = 1; any error is accepted."""
+    """Return the end of a step of length 1 of y' = z y from y = 1. Any error is accepted."""
     method = new_radau5(2, 1e-6, 1e9, PLENTY)
     assert drive(method, linear(z), 0.0, np.array([1.0, 0.0]), 1.0, 1.0) == STEP_DONE
     assert method.counts[ACCEPTED] == 1
@@ -233,7 +233,7 @@ def test_errors_fall_with_the_tolerance():
 
 
 def test_analytic_jacobian_of_the_system_is_used():
-    """None is differenced: told nothing, the method cannot take large steps."""
+    """No Jacobian is differenced: without one, the method could not take large steps."""
     told, untold = (Planar(LINEAR, -1e5, 0.0, part) for part in (1.0, 0.0))
     knowing = integrated(told, (1.0, 0.5), 1.0, 1e-6, 1e-6)
     ignorant = new_radau5(2, 1e-6, 1e-6, PLENTY)
@@ -242,7 +242,7 @@ def test_analytic_jacobian_of_the_system_is_used():
     assert ignorant.counts[RHS] > 100 * knowing.counts[RHS]
 
 
-def test_work_is_counted():
+def test_radau5_counts_its_work():
     method = integrated(STIFF, (2.0, 0.0), 2.0, 1e-6, 1e-6)
     rhs, accepted, jacobians = (int(method.counts[i]) for i in (RHS, ACCEPTED, JACOBIANS))
     # begin and every accepted step evaluate once, every Newton iteration three times, and a step has at least one
@@ -253,7 +253,7 @@ def test_work_is_counted():
 # ---- how it ends ---------------------------------------------------------------------------------------------------
 
 
-def test_budget_is_respected():
+def test_radau5_stops_at_its_budget():
     method = new_radau5(2, 1e-8, 1e-8, 500)
     assert drive(method, STIFF, 0.0, np.array([2.0, 0.0]), 0.0, 2.0) == OUT_OF_BUDGET
     assert 500 <= method.counts[RHS] < 500 + 3 * 7 + 3

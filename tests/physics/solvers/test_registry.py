@@ -1,4 +1,4 @@
-"""The list of methods: what configs may name, what is there, and what it costs to look."""
+"""Tests of the registry of methods: its names, its entries, and the cost of importing it."""
 
 import importlib.util
 import subprocess

@@ -1,4 +1,4 @@
-"""Systems (s I - J) x = r of implicit methods, whole and halved, against NumPy."""
+"""Compare systems (s I - J) x = r of implicit methods, whole and halved, with NumPy."""
 
 from fractions import Fraction
 

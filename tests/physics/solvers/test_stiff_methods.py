@@ -1,4 +1,4 @@
-"""Published stiff problems, with every method of the registry that is meant for such."""
+"""Solve published stiff problems with every method of the registry that is meant for them."""
 
 import numpy as np
 import pytest
@@ -71,6 +71,6 @@ def test_stiff_method_ends_as_published_in_few_steps(name, problem):
 @each_problem
 @each_method
 def test_error_of_a_stiff_method_falls_with_the_tolerance(name, problem):
-    """By half of the digits that the tolerance falls by at the least."""
+    """It falls by at least half of the digits by which the tolerance falls."""
     loose, tight = (error_of(name, problem, tolerance)[0] for tolerance in (1e-5, 1e-9))
     assert tight < 1e-2 * loose

@@ -1,4 +1,4 @@
-"""The stage basin: shares, a run that is cut off, any number of processes, the contact model, and what it refuses."""
+"""Tests of the stage `basin`: shares, interrupted runs, processes, the contact model, and rejected questions."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ SMALL = ("basin.cells=[16,12]", "basin.lower=[0.12,-1.2]", "basin.upper=[0.24,-0
 
 
 class CutOff(Silent):
-    """Interrupts after so many calls of `advance`."""
+    """A progress that interrupts the run after some calls of `advance`."""
 
     def __init__(self, left):
         self.left = left
@@ -55,7 +55,7 @@ def whole(tmp_path_factory):
 
 @pytest.fixture
 def in_bits(monkeypatch):
-    """Many pieces instead of one."""
+    """Divide the work into many pieces instead of one."""
     monkeypatch.setattr(RigidQuestion.__init__, "__defaults__", (50, 20, 0, (RTOL, ATOL)))
 
 

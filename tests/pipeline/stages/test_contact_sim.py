@@ -1,4 +1,4 @@
-"""The contact-sim stage: what it stores of a walk on compliant ground, and what it says when there is none."""
+"""Tests of the stage `contact-sim`: its results, and its messages without a walk on compliant ground."""
 
 import json
 import math
@@ -169,7 +169,7 @@ def test_ground_carries_the_walker_and_never_pulls(paper):
     assert trajectory["penetration_m"].max() <= paper.summary["max_penetration_m"] * (1.0 + 1e-9)
 
 
-def test_equal_names_mean_the_same_in_both_models(paper):
+def test_variables_of_equal_name_have_equal_meaning_in_both_models(paper):
     rigid = simulate.run(restrict(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
     for group, expected in SHARED.items():
         ours, theirs = (walk[group].variables for walk in (paper, rigid))
@@ -235,7 +235,7 @@ def test_massless_hip_is_the_limit_of_a_tiny_hip_mass():
     np.testing.assert_allclose(none.summary["step_lengths_m"], little.summary["step_lengths_m"], atol=1e-5)
 
 
-def test_given_start_needs_no_gait_unless_the_pads_do():
+def test_walk_from_a_given_start_needs_a_gait_only_for_its_pads():
     """The step that pads and steps are measured by is then that of the start itself."""
     content = run("start=[-0.2042, 0.1694, -0.6, -0.86]", "contact.pad_pitch=0.3714", "outputs=[]", inputs=())
     assert content.summary["outcome"] == "walked"

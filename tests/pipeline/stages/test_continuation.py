@@ -1,4 +1,4 @@
-"""The stage `continuation`: what it stores, in which unit, and which questions it turns away."""
+"""Tests of the stage `continuation`: its results, their units, and the questions that it rejects."""
 
 import math
 import re
@@ -286,7 +286,7 @@ def test_invalid_questions_are_rejected(sets, said):
 
 
 def follow_coarsely(*sets):
-    """With the attractor at fewer values, and without gaits of other numbers of steps than 1, 2, 4."""
+    """Follow the attractor at fewer values, and only gaits of 1, 2 and 4 steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(THOROUGHNESS, "rigid", replace(THOROUGHNESS["rigid"], values=36, exponents=12, averaged=400))
         patch.setattr(family_search, "OTHER_PERIODS", ())

@@ -1,4 +1,4 @@
-"""The design stage: optima against brute grids, bounds kept, questions refused, and the config that it ends in."""
+"""Tests of the stage `design`: optima compared with grids, bounds, rejected questions, and the config written."""
 
 import json
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_random_starts_agree_on_one_optimum():
 
 
 def bowls(x):
-    """Two bowls, the deeper one at 0.8; between 0.4 and 0.6 there is nothing."""
+    """Two bowls, the deeper one at 0.8, with no values between 0.4 and 0.6."""
     u = float(x[0])
     if 0.4 < u < 0.6:
         return None
@@ -165,7 +165,7 @@ def test_impossible_bounds_give_no_answer():
 
 
 def contact_gait(name):
-    """Its step, and the cost of transport as design has it."""
+    """Return a contact gait's step, and its cost of transport as `design` computes it."""
     config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
@@ -181,7 +181,7 @@ def test_contact_cost_of_transport_is_ground_loss_per_weight_and_distance(name):
     assert cost == pytest.approx(step.dissipated_J.sum() / (20.0 * 9.81 * step.length_m), rel=1e-7)
 
 
-def test_settled_kneed_walk_costs_as_much_as_its_gait():
+def test_settled_kneed_walk_has_the_cost_of_transport_of_its_gait():
     config, gait, _, cost = contact_gait("kneed-level")
     scene, costs, ways = contact_scene(config, gait.step_length), [], []
     for steps in (14, 15):

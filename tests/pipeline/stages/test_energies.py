@@ -1,4 +1,4 @@
-"""Energies of both models have one zero: the point where the stance foot touched in each step."""
+"""Check that energies of both models have the same zero: where the stance foot touched in each step."""
 
 from pathlib import Path
 

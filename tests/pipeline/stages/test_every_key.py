@@ -1,4 +1,4 @@
-"""Every number of every built-in walker, in every stage that takes a key: it is followed, or refused in words."""
+"""Check that each stage that takes a key follows every number of every built-in walker, or explains why not."""
 
 from dataclasses import replace
 from fnmatch import fnmatch
@@ -75,7 +75,7 @@ def config(walker):
 
 @pytest.fixture(scope="module")
 def keys(config):
-    """The keys of a model that hold a number in the config."""
+    """Return the keys of a model whose values in the config are numbers."""
     found = ["slope_deg"]
     for path, field in leaves(Config, held=config):
         held = config
@@ -87,7 +87,7 @@ def keys(config):
 
 
 def question(config, key, model):
-    """What `continuation` asks over a small span above a key's own value, or below where that is the largest."""
+    """Return a question for `continuation` over a small span above the key's value, or below it at the largest one."""
     taken = restrict(config, PIPELINE["continuation"].takes)
     taken.continuation = config.continuation.model_copy(update={"model": model})
     parameter = parameter_of(key, taken)
@@ -99,7 +99,7 @@ def question(config, key, model):
 
 
 def followed(asked):
-    """The models that are followed, or why none is."""
+    """Return the models that are followed, or the reason why there are none."""
     try:
         return models_of(asked), ""
     except ConfigError as error:
@@ -136,7 +136,7 @@ def fixedpoint(config):
 
 @pytest.fixture(scope="module")
 def subject(config, fixedpoint):
-    """The rigid model's gait, to be disturbed."""
+    """Return the rigid model's gait as the subject of disturbances."""
     taken = restrict(config, PIPELINE["robustness"].takes)
     return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
 
@@ -160,12 +160,12 @@ ALL_BUT_THE_RIGID_MODEL = {"name", "source", "strides", "ground", "contact", "re
 
 @pytest.fixture(scope="module")
 def known():
-    """Gradients by all that the rigid model reads, and by key."""
+    """Return gradients by everything that the rigid model reads, and by key."""
     return {}
 
 
 def gradients_by(key, config, subject, known):
-    """Those of a walker with the same rigid model are the same, unless the key is in a block that may differ."""
+    """Return the gradients. Walkers of equal rigid model share them, unless the key is in a block that may differ."""
     same = config.model_dump_json(exclude=ALL_BUT_THE_RIGID_MODEL), key
     if same not in known or key.startswith(ONLY_CONTACT):
         known[same] = robustness.gradients_of(subject, key)

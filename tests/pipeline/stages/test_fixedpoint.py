@@ -1,4 +1,4 @@
-"""The fixedpoint stage: what it stores and says, for slopes with and without a gait."""
+"""Tests of the stage `fixedpoint`: its results and messages on slopes with and without a gait."""
 
 import json
 import math

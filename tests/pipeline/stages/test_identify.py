@@ -1,4 +1,4 @@
-"""The identify stage: parameters recovered from measured walks, misfits recognised, damaged questions refused."""
+"""Tests of the stage `identify`: recovered parameters, recognised misfits, and rejected questions."""
 
 import json
 from pathlib import Path
@@ -325,7 +325,7 @@ def test_table_of_periods_alone_is_read(tmp_path):
 
 
 def test_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
-    """Lengths that repeat to the last digit leave no noise to them, and would leave any to the periods."""
+    """Lengths that repeat to the last digit leave no noise of their own, so any noise of the periods would fit."""
     path = tmp_path / "table.csv"
     path.write_text("period_s,length_m\n" + "".join(f"{(0.59, 0.77)[k % 2]},0.0171\n" for k in range(10)))
     fit = "identify.fit={slope_deg: [0.1, 6], walker.leg_length_m: [0.6, 2]}"

@@ -1,4 +1,4 @@
-"""The walks of docs/identify-cases.md: the answers that it states."""
+"""Check the answers that docs/identify-cases.md states."""
 
 import re
 from pathlib import Path

@@ -1,11 +1,11 @@
-"""Units stand in labels, and some in names as well: they have to be the same."""
+"""Check that the unit in a name is the unit in the label."""
 
 import pytest
 
 import walkerlab
 from walkerlab.evidence.benchmarks import accuracy
 from walkerlab.evidence.benchmarks.engines import rows as engines
-from walkerlab.evidence.paper import tune_limit
+from walkerlab.evidence.paper import tune
 from walkerlab.evidence.verification.known_problems import Known
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import axis_label, labels_of, unit_by_name
@@ -16,7 +16,7 @@ LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.KNEE_LABELS,
     "walk": walk.TIME_LABELS | walk.STEP_LABELS,
-    "limit": tune_limit.FACTOR_LABELS | tune_limit.DISTANCE_LABELS | tune_limit.WALK_LABELS,
+    "limit": tune.FACTOR_LABELS | tune.DISTANCE_LABELS | tune.WALK_LABELS,
 }
 
 

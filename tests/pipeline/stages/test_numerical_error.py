@@ -1,4 +1,4 @@
-"""The numerical error of a walk: what tighter tolerances change, and what is said where there are none."""
+"""Tests of a walk's numerical error, which tighter tolerances show, and of the messages if it is unknown."""
 
 import pytest
 from annotated_types import Ge

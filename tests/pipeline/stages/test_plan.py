@@ -1,4 +1,4 @@
-"""The plan stage: its answer, its figure, and questions that it refuses."""
+"""Tests of the stage `plan`: its answer, its figure, and the questions that it rejects."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Walks recorded elsewhere, read as files and compared: round trips, and 300 damaged files."""
+"""Read and compare walks recorded elsewhere: round trips, and 300 damaged files."""
 
 import contextlib
 import functools
@@ -66,7 +66,7 @@ def test_exported_walk_is_read_back_with_the_same_steps(tmp_path, model, period,
     assert inside == pytest.approx(1.0, abs=0.02)
 
 
-def test_degrees_noise_gaps_offsets_and_swapped_legs_change_little(tmp_path):
+def test_walk_is_read_despite_noise_gaps_offsets_and_swapped_legs(tmp_path):
     walk = simulated("rigid")
     text = table(walk, math.degrees(1.0), "deg", noise=5e-4, every=2, delay=12.5, legs=(1, 0))
     read = walkerlab.read_walk(written(tmp_path, text))
@@ -77,7 +77,7 @@ def test_degrees_noise_gaps_offsets_and_swapped_legs_change_little(tmp_path):
 
 
 @pytest.mark.parametrize("delay", [100.0, 1.7e9])
-def test_start_of_the_clock_does_not_matter(tmp_path, delay):
+def test_first_time_of_a_recording_does_not_matter(tmp_path, delay):
     """Clocks of cameras count from when they were switched on, or from 1970."""
     lines = table(simulated("rigid"), every=4).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]
@@ -176,7 +176,7 @@ def test_figures_label_the_recorded_walk_with_its_name(tmp_path):
         assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
 
 
-def test_only_changed_content_makes_the_result_stale(tmp_path):
+def test_result_becomes_stale_only_if_the_content_of_its_file_changes(tmp_path):
     path = written(tmp_path, table(simulated("rigid")))
     config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
     folder = RunFolder(tmp_path / "runs", "recorded")
@@ -300,7 +300,7 @@ def test_bad_recording_is_rejected_before_anything_is_computed(tmp_path):
 
 
 class Notes(Silent):
-    """Progress that keeps the lines it is to show."""
+    """A progress that keeps the lines it receives."""
 
     def __init__(self):
         self.lines = []
@@ -370,7 +370,7 @@ def test_impossible_path_is_rejected(name):
 
 
 def damaged(draw, lines):
-    """A recording with one thing wrong or odd, and what that is."""
+    """Return a recording with one defect, and the defect's name."""
     head, *rows = lines
     row, cell = draw.randrange(len(rows)), draw.randrange(3)
     cells = rows[row].split(",")

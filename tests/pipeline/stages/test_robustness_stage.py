@@ -1,4 +1,4 @@
-"""The robustness stage: what it answers, keeps and refuses."""
+"""Tests of the stage `robustness`: its answers, its stored results, and the questions that it rejects."""
 
 import json
 from pathlib import Path
@@ -101,7 +101,7 @@ def test_robustness_answer_is_in_plain_words(rigid):
 
 
 def test_advice_names_a_walker_parameter_with_a_resolved_effect(rigid):
-    """Neither gravity, nor what has no effect."""
+    """It names neither gravity nor a parameter without effect."""
     row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm_scaled")
     others = [row | {"to": "gravity_m_s2", "relative": -9.0}, row | {"to": "walker.x", "why": "lost in rounding"}]
     own = [row | {"to": "walker.hip_mass_kg", "relative": 0.25}]
@@ -129,7 +129,7 @@ def test_scaled_norm_does_not_favour_longer_legs():
 
 
 def test_push_reports_whether_the_ground_still_pushes(rigid, both):
-    """By the force on all masses: their weight and what accelerates them, along the walk that follows the push."""
+    """Compare with the force on all masses, weight and acceleration, along the walk after the push."""
     (push,) = rigid.summary["largest_push"]
     assert push["forward_normal_impulse_N_s"] > 0.0 > push["backward_normal_impulse_N_s"]
     said = said_of(rigid.summary)
@@ -196,7 +196,7 @@ def test_unstable_gait_has_no_norm_but_other_results():
 
 
 def test_missing_derivative_is_a_gap():
-    """Where multipliers meet the spectral radius has none."""
+    """The spectral radius has no derivative where multipliers meet."""
     rows = [
         {"of": "period_s", "to": "slope_rad", "value": 0.1},
         {"of": "spectral_radius", "to": "slope_rad", "value": None},

@@ -1,4 +1,4 @@
-"""The simulate stage: physical legs, what outputs ask for, and outcomes."""
+"""Tests of the stage `simulate`: physical legs, requested outputs, and outcomes."""
 
 import json
 import math
@@ -167,7 +167,7 @@ def test_pulling_ground_is_reported():
 
 
 def test_walk_reports_forces_that_no_ground_can_give():
-    """A pull, also of a walk that falls, and friction; nothing of a walk that keeps to both."""
+    """It reports a pull, also for a walk that falls, and too much friction, and nothing for a walk without either."""
     fast = run(contact=None, start=(-0.3, 0.25, -1.5, -2.6), strides=1).summary
     assert fast["min_normal_force_N"] < 0.0
     assert f"pull with {-fast['min_normal_force_N']:.3g} N" in fast["objections"][0]

@@ -1,4 +1,4 @@
-"""What is stored of a long walk: less of its middle, and every heel strike."""
+"""Check that a long walk is stored with fewer samples in its middle, but with every heel strike."""
 
 import numpy as np
 

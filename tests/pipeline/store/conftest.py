@@ -1,4 +1,4 @@
-"""A content that uses all there is, and what goes with it into a file."""
+"""A content that uses all features of the format, and the attributes of its file."""
 
 import contextlib
 import os
@@ -50,7 +50,7 @@ def origin():
 
 @contextlib.contextmanager
 def without_privileges():
-    """Permissions count for whoever runs the tests, root too."""
+    """Make file permissions count for whoever runs the tests, including root."""
     user = os.geteuid()
     if user == 0:
         os.seteuid(65534)

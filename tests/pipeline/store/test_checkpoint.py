@@ -1,4 +1,4 @@
-"""Checkpoint of a result: what is kept survives, what was cut short or belongs to another result does not."""
+"""Tests of checkpoints: complete entries survive; incomplete ones and those of another result do not."""
 
 import math
 
@@ -25,7 +25,7 @@ def test_checkpointed_values_are_restored_bit_for_bit(path):
 
 
 @pytest.mark.parametrize("cut", range(1, 21))
-def test_truncated_last_line_is_dropped_and_rewritten(path, cut):
+def test_truncated_last_line_of_a_checkpoint_is_dropped_and_rewritten(path, cut):
     whole = path.read_bytes()
     path.write_bytes(whole[:-cut])
     checkpoint = Checkpoint(path, "key")
@@ -34,13 +34,13 @@ def test_truncated_last_line_is_dropped_and_rewritten(path, cut):
     assert path.read_bytes() == whole
 
 
-def test_lines_after_a_damaged_one_are_dropped(path):
+def test_checkpoint_lines_after_a_damaged_one_are_dropped(path):
     path.write_bytes(path.read_bytes().replace(b"0.1", b"0.2"))
     assert Checkpoint(path, "key").kept == {}
 
 
 @pytest.mark.parametrize("forged", [b"\n", b"x\n", line(3), line(["a"]), line(["a", ["b"]]), line({"a": 1, "b": 2})])
-def test_line_that_is_not_a_part_is_dropped(path, forged):
+def test_checkpoint_line_that_is_not_a_part_is_dropped(path, forged):
     with path.open("ab") as file:
         file.write(forged)
     assert list(Checkpoint(path, "key").kept) == ["one", "two"]

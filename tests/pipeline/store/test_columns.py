@@ -1,4 +1,4 @@
-"""Rows whose fields carry unit and meaning, as labelled arrays."""
+"""Tests of labelled arrays made of rows whose fields have units and meanings."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Files that are not what they say: refused with a reason, without a traceback and without a large allocation."""
+"""Check that damaged files are rejected with a reason, without a traceback and without large allocations."""
 
 import hashlib
 import os
@@ -15,7 +15,7 @@ PLENTY = 64 << 20
 
 
 def sealed(image: bytes) -> bytes:
-    """The bytes with a seal that is right, so that what is inside is what gets looked at."""
+    """Return the bytes with a valid seal, so that only their content can be at fault."""
     return image + f"\nwalkerlab sha256 {hashlib.sha256(image).hexdigest()}\n".encode()
 
 
@@ -26,7 +26,7 @@ def path(tmp_path, content, identity, origin):
 
 
 def refusal(path, key) -> str:
-    """Why a file is refused; fails if it is accepted, or if judging it takes much memory."""
+    """Return the reason why a file is rejected. Fail if it is accepted, or if the check takes much memory."""
     tracemalloc.start()
     try:
         verdict = artifact.check(path, key)
@@ -244,7 +244,7 @@ def test_forged_content_is_rejected_even_with_a_valid_seal(path, identity, alter
 
 
 def test_resealing_unchanged_content_is_accepted(path, identity):
-    """So that the test above refuses for what was altered and not for the altering."""
+    """So the test above rejects files for the change, not for the new seal."""
     with h5py.File(path, "r+"):
         pass
     image = path.read_bytes()

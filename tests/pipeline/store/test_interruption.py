@@ -1,4 +1,4 @@
-"""Writers that die or are refused: what was there before stays, and nothing else is left."""
+"""Check that interrupted writers leave the old file and nothing else."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""What Octave, NCO, xarray and h5py make of artifacts, and what this version makes of older ones."""
+"""Read artifacts with Octave, NCO, xarray and h5py, and older artifacts with this version."""
 
 import hashlib
 import json
@@ -42,7 +42,7 @@ def stored(tmp_path, texts, identity, origin):
     return tmp_path / "a.h5"
 
 
-def test_text_has_a_fixed_length_and_attributes_may_be_long(stored, texts):
+def test_text_is_stored_with_a_fixed_length_and_long_attributes_are_readable(stored, texts):
     with h5py.File(stored) as file:
         for holder in (file, file["walk"], *file["walk"].values()):
             for name in holder.attrs:

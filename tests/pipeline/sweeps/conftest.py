@@ -65,7 +65,7 @@ def toy(tmp_path, monkeypatch):
 
 @pytest.fixture
 def marks(tmp_path, monkeypatch):
-    """Where points that are computed leave a mark: their number."""
+    """Let computed points leave marks, and return a function that counts them."""
     folder = tmp_path / "marks"
     folder.mkdir()
     input_cache.cache_clear()  # earlier sweeps in this process leave what they needed

@@ -1,4 +1,4 @@
-"""A sweep of quick points: what is computed, what is taken over, what is stored."""
+"""Tests of a sweep with quick points: which are computed, which are reused, and what is stored."""
 
 import csv
 import io
@@ -57,7 +57,7 @@ def test_every_value_of_the_stage_is_a_variable_over_the_parameters(toy):
         assert not [name for name in dataset if "wall_s" in name or "left_out" in name]
 
 
-def test_row_equals_the_result_for_that_config(toy):
+def test_row_of_a_sweep_equals_the_result_of_its_config(toy):
     swept = toy.run("roll", GRAVITIES, "strides=[2, 3]")
     config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").config(7)
     report = execute(config, "roll", RunFolder(toy.runs / "elsewhere", "one"), graph=toy.graph)
@@ -82,7 +82,7 @@ WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those
 
 
 def plain(sentences):
-    """Sentences with ordinary spaces."""
+    """Return sentences with ordinary spaces."""
     return [" ".join(sentence.split()) for sentence in sentences]
 
 

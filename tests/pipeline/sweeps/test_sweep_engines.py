@@ -1,4 +1,4 @@
-"""Workers that die, on this machine, on Dask and as jobs; what is left is there and the guilty point is told."""
+"""Kill workers on this machine, on Dask and in jobs; the other points are computed, and the fatal one is named."""
 
 import contextlib
 import os
@@ -377,7 +377,7 @@ def test_unknown_or_uninstalled_sweep_engine_is_reported(monkeypatch):
     assert caught.value.advice == "pip install 'walkerlab[dask]'"
 
 
-def test_option_of_a_slurm_job_may_be_a_decimal_number_and_is_refused_if_it_is_no_number(tmp_path):
+def test_option_of_a_slurm_job_must_be_a_number(tmp_path):
     for text in ("1.5", "abc"):
         options = EngineOptions(folder=tmp_path, options={"cluster": "local", "mem_gb": text})
         with contextlib.ExitStack() as stack:

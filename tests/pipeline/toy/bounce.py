@@ -1,4 +1,4 @@
-"""How high, by the contact's stiffness."""
+"""Compute the height of a bounce from the contact's stiffness."""
 
 from walkerlab.pipeline.store.content import Content
 

@@ -1,4 +1,4 @@
-"""Count the stones one by one; a run may be cut off after as many as the test says."""
+"""Count the stones one by one, and end the process after as many as the test says."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""No answer beyond a slope of one radian; waits for a file, if the test names one, to be caught in the act."""
+"""Drop a stone. There is no answer beyond a slope of one radian. If a test names a file, the stage waits for it."""
 
 import os
 import time

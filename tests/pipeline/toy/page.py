@@ -1,4 +1,4 @@
-"""One page."""
+"""Write one page."""
 
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content

@@ -1,4 +1,4 @@
-"""Free fall."""
+"""Compute a free fall."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""One figure, that names what it was drawn from."""
+"""Draw one figure that names the results from which it was drawn."""
 
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content

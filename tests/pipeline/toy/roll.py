@@ -1,4 +1,4 @@
-"""As many steps as asked for, each a fall."""
+"""Take as many steps as requested, each of them a fall."""
 
 from walkerlab.pipeline.store.content import Content
 

@@ -1,4 +1,4 @@
-"""A measured time, and which one was best."""
+"""Return a measured time, and the best choice."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""The command line in processes of its own: of the real pipeline and of the toy one."""
+"""Fixtures that run the command line, of the real pipeline and of the toy one, in separate processes."""
 
 import json
 import os
@@ -33,7 +33,7 @@ class Program:
         return self(*arguments, "--jobs", "1")
 
     def start(self, *arguments, environment=None, **options):
-        """Start it as a terminal does: where the tests are a script's background job they ignore Ctrl-C."""
+        """Start the program as a terminal does: background jobs of a script ignore Ctrl-C."""
         return subprocess.Popen(
             [*self.command, *map(str, arguments)],
             cwd=self.folder,

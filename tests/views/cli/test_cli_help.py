@@ -151,7 +151,7 @@ def test_bad_config_exits_3_before_anything_runs(walker, arguments):
 
 
 def completed(walker, typed):
-    """What bash is offered for the last word of a command line."""
+    """Return what bash offers for the last word of a command line."""
     asked = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1), "_WALKERLAB_COMPLETE": "complete_bash"}
     code = "import sys; from walkerlab.views.cli.main import main; sys.argv = ['walkerlab']; main()"
     command = [sys.executable, "-c", code]

@@ -1,4 +1,4 @@
-"""Commands that begin, repeat and remove runs, and how commands end that are cut short."""
+"""Tests of commands that start, repeat and remove runs, and of interrupted commands."""
 
 import json
 import os
@@ -316,7 +316,7 @@ def test_compile_says_how_many_kernels_are_ready(walker):
     assert re.fullmatch(r"\d+ kernels are ready for rigid-only, after \d+ s\.\n", done.stdout)
 
 
-def test_long_version_states_the_origin_of_kernels(walker):
+def test_verbose_version_shows_where_kernels_come_from(walker):
     first, versions, *kernels = walker("--version", "--verbose").stdout.splitlines()
     assert first.startswith("walkerlab ")
     assert {"Python", "numba", "llvmlite", "sources"} <= set(versions.split())

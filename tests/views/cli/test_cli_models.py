@@ -1,12 +1,12 @@
-"""`walkerlab export RUN model` in a process of its own."""
+"""Tests of `walkerlab export RUN model` in a separate process."""
 
 import pytest
 
 from walkerlab.errors import NoAnswer
 from walkerlab.exchange.export import ENDINGS
 from walkerlab.views.cli import models
-from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Target
+from walkerlab.views.cli.request import Request
 
 
 def test_exporting_a_model_without_a_run_computes_its_gait(walker):
@@ -71,7 +71,7 @@ def test_walker_without_a_gait_is_not_exported(tmp_path, monkeypatch):
     answer = NoAnswer("no gait", "advice")
     monkeypatch.setattr(models, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
     with pytest.raises(NoAnswer):
-        models.write_model("paper", tmp_path, Target("adm", tmp_path / "x.adm"), None, Console(quiet=True))
+        models.write_model("paper", Request("export", runs=tmp_path, quiet=True), Target("adm", tmp_path / "x.adm"))
     assert not list(tmp_path.glob("x.*"))
 
 

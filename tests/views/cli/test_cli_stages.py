@@ -10,7 +10,7 @@ COMMON = {"stage", "run_dir", "artifact", "reused", "wall_s", "left_out"}
 
 
 def one_object(done):
-    """The one JSON object on stdout."""
+    """Return the one JSON object on stdout."""
     value, end = json.JSONDecoder().raw_decode(done.stdout)
     assert done.stdout[end:] == "\n"
     assert set(value) >= COMMON
@@ -212,7 +212,7 @@ def test_runs_option_selects_the_folder(toy, tmp_path):
 
 
 def read_all(terminal):
-    """What a process wrote on a terminal until it closed it."""
+    """Return what a process wrote on a terminal until it closed it."""
     text = b""
     while True:
         try:

@@ -1,4 +1,4 @@
-"""`walkerlab sweep`, `walkerlab diff` and the list of all runs, as a user types them."""
+"""Tests of `walkerlab sweep`, `walkerlab diff` and the list of all runs, as a user types them."""
 
 import csv
 import io

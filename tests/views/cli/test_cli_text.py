@@ -1,4 +1,4 @@
-"""JSON values as text for people, and how far a stage is."""
+"""Tests of JSON values as text for people, and of progress."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`walkerlab design` ends in a config that extends its start, ready to be walked, and never over a file."""
+"""Check that `walkerlab design` writes a config that extends its start and can walk, and overwrites none."""
 
 import json
 from pathlib import Path

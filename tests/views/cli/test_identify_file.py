@@ -1,4 +1,4 @@
-"""`walkerlab identify` from a walk's exported steps to a config, in processes of their own."""
+"""Go from a walk's exported steps to a config by `walkerlab identify`, in separate processes."""
 
 import json
 from pathlib import Path

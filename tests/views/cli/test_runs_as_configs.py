@@ -1,4 +1,4 @@
-"""Runs as configs: what `-c` names, where that runs, and that no result of another config is overwritten."""
+"""Tests of runs as configs: what `-c` accepts, where results go, and that none of another config is overwritten."""
 
 import json
 import os
@@ -20,7 +20,7 @@ def config(toy, path, gravity, name="stone"):
 
 
 def gravity_of(toy, artifact):
-    """The gravity that a stored fall of one metre tells: t^2 = 2 / g."""
+    """Return the gravity that a stored fall of one metre implies: t^2 = 2 / g."""
     stored = json.loads(toy("show", "drop", "-c", artifact.parent, "--json").stdout)
     return 2.0 / stored["summary"]["period_s"] ** 2
 

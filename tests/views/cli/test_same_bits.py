@@ -1,4 +1,4 @@
-"""One config, one machine: the same results to the last bit, whatever the process and however many of them."""
+"""Check that results are the same to the last bit in any process and in any number of processes."""
 
 from walkerlab.pipeline.store import artifact
 

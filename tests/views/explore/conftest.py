@@ -1,4 +1,4 @@
-"""One server for all tests of a file."""
+"""Fixture of one server for all tests of a file."""
 
 import pytest
 from explored import Served

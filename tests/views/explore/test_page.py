@@ -1,4 +1,4 @@
-"""The page of `walkerlab explore` in a real browser: dragged, typed, searched, gone back in, saved, and left alone."""
+"""Use the page of `walkerlab explore` in a real browser: drag, type, search, go back, save, and leave it alone."""
 
 import itertools
 
@@ -52,14 +52,14 @@ def opened(browser, served, blocked=(), **seen):
 
 @pytest.fixture
 def page(browser, served):
-    """The page standing still and without gaits along a number, which would be computed for every test."""
+    """The page at rest, without gait curves, which would be computed for every test."""
     yield opened(browser, served, ["*/api/along"], calm=True)
     browser.call("Network.setBlockedURLs", urls=[])
 
 
 @pytest.fixture
 def whole_page(browser, served):
-    """The page as it is; gaits along a number that are still being computed at the end are dropped."""
+    """The complete page. Gait curves that are still being computed at the end are dropped."""
     yield opened(browser, served)
     browser.open(Address("about:blank"))
     # What the page asked just before it was left may arrive after this question, which then is the older one.

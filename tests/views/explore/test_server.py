@@ -1,4 +1,4 @@
-"""`walkerlab explore` as a process: its numbers are the command's, and what is refused is refused in words."""
+"""Tests of `walkerlab explore` as a process: its numbers are those of the command, and errors have messages."""
 
 import contextlib
 import http.client
@@ -31,7 +31,7 @@ def settings(seed, count):
 
 
 def same(served, config, changes, models):
-    """The answer over the connection, compared with that of the command."""
+    """Compare the answer over the connection with that of the command."""
     status, said = served.walk(changes, models, config=config)
     assert status == 200
     for stage in ("fixedpoint", *(name for model, name in STAGES.items() if model in models)):
@@ -381,7 +381,7 @@ def test_jobs_import_nothing_from_the_start_folder(tmp_path):
 
 
 def at_work_for(folder):
-    """Commands that run for a folder of runs."""
+    """Return the commands that run for a folder of runs."""
     return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]
 
 
@@ -389,18 +389,18 @@ SOME_TICKS = 30  # of a processor's clock: about 0.3 s of computing
 
 
 def nice(process):
-    """How far a process stands back behind others."""
+    """Return the niceness of a process."""
     return os.getpriority(os.PRIO_PROCESS, int(process))
 
 
 def ticks_of(worker):
-    """The processor time of a worker, in ticks of the clock."""
+    """Return the processor time of a worker, in clock ticks."""
     fields = (worker.parent / "stat").read_text().rpartition(")")[2].split()
     return int(fields[11]) + int(fields[12])
 
 
 def workers_of(process):
-    """Processes that this one has started and that are there still."""
+    """Return the processes that this one has started and that still run."""
     return [file for file in Path("/proc").glob("[0-9]*/status") if f"PPid:\t{process}\n" in text_of(file)]
 
 

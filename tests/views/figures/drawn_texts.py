@@ -1,11 +1,11 @@
-"""What a renderer is told to write, and where."""
+"""Texts that a renderer gets, and their places."""
 
 import pytest
 from matplotlib.text import Text
 
 
 def texts_drawn(figure):
-    """Every text that the renderer is given, with its box."""
+    """Return every text that the renderer receives, with its box."""
     seen, draw = [], Text.draw
 
     def noted(text, renderer):

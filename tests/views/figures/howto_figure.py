@@ -1,4 +1,4 @@
-"""The figure that docs/adding.md adds as an example, made of what stands there."""
+"""The example figure of docs/adding.md, built from the code on that page."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A basin of attraction made by hand, laid out by the stage itself."""
+"""A basin of attraction with values set by hand, in the layout of the stage."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""A family of gaits made by hand: a gait of one step that doubles its period at a slope of 4."""
+"""A family of gaits set by hand: a gait of one step that doubles its period at a slope of 4."""
 
 import numpy as np
 from synthetic_walks import stored
@@ -29,7 +29,7 @@ def branch(period, value, stable, spread, marks):
 
 
 def families(curves=True, flips=True):
-    """The result of `continuation` as figures see it; without flips, of its gait of one step alone."""
+    """Return the result of `continuation` as figures see it. Without flips it has only its gait of one step."""
     one = np.array([1.0, 3.0, 4.5, END])
     two = np.array([4.2, 4.6, END])
     groups = {

@@ -1,4 +1,4 @@
-"""Maps of stability made by hand, laid out by the stage itself."""
+"""Stability maps with values set by hand, in the layout of the stage."""
 
 from synthetic_walks import stored
 
@@ -21,7 +21,7 @@ ENDS = (
 
 
 def stability_maps():
-    """One column a fate; the fixed step's verdicts in their order, from small steps to large ones."""
+    """Return maps with one column per outcome. Verdicts of the fixed step follow from small to large steps."""
     kept = {}
     for i in range(CELLS):
         for j, (outcome, sharper, error) in enumerate(ENDS):

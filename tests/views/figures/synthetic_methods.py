@@ -1,4 +1,4 @@
-"""Methods measured by hand, in the layout that `accuracy` stores."""
+"""Run times and errors of methods set by hand, in the layout that `accuracy` stores."""
 
 from synthetic_maps import stability_maps
 from synthetic_walks import both_models, stored

@@ -1,4 +1,4 @@
-"""What `tune` stores, made by hand as far as figures need it: walks from its starts, its map, and the rigid limit."""
+"""Results of `tune` set by hand as far as figures need them: walks, map of starts, and rigid limit."""
 
 import numpy as np
 from synthetic_walks import motion, stored
@@ -19,7 +19,7 @@ def walk(period):
 
 
 def starts():
-    """A map of every outcome there is."""
+    """Return a map with every possible outcome."""
     both = ("stance", "swing")
     outcome = np.resize([int(one) for one in Outcome], (FACTORS.size, FACTORS.size))
     cells = {"outcome": outcome, "steps": np.where(outcome == Outcome.WALKED, STEPS, 1)}
@@ -37,7 +37,7 @@ def limit(run_times):
 
 
 def tuned(run_times=(0.021, 0.024, 0.03, 0.067)):
-    """The result of `tune` of another walker than the paper's."""
+    """Return the result of `tune` for a walker other than the paper's."""
     groups = {"rigid_start": walk(0.7), "adjusted": walk(0.71), "map": starts()}
     groups |= {name: limit(run_times) for name, _ in LIMITS}
     adjustment = {"needed": True, "scale_dtheta1": 1.2, "scale_dtheta2": 0.9, "walked_steps": STEPS}

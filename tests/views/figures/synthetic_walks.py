@@ -1,4 +1,4 @@
-"""Walks made by hand in the layout that the stages store: legs that swing like pendulums, feet on the slope."""
+"""Walks set by hand, in the layout of the stages: legs that swing like pendulums, with feet on the slope."""
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def stored(stage, groups, summary):
 
 
 def motion(steps, period, jumps):
-    """Time, step, angle and velocity of the legs; `jumps` has both sides of each heel strike among the samples."""
+    """Return time, step, angle and velocity of the legs. With `jumps`, both sides of each heel strike are samples."""
     phase = np.linspace(0.0, 1.0, SAMPLES)
     turn = np.pi * phase
     pieces = []
@@ -72,7 +72,7 @@ def trajectory(step, time, angle, velocity, level):
 
 
 def walked(period, count, **more):
-    """What is stored of the steps, if there are any."""
+    """Return the stored variables of the steps, if there are any."""
     number = np.arange(1, count + 1)
     columns = step_columns(
         period * number,
@@ -85,7 +85,7 @@ def walked(period, count, **more):
 
 
 def rigid(steps=10, period=0.7, outcome="walked", completed=None):
-    """The result of `simulate`; `completed` steps, and the rest of the time on the way to no heel strike."""
+    """Return the result of `simulate` with `completed` steps. In the remaining time no heel strike follows."""
     time, step, angle, velocity = motion(steps, period, jumps=True)
     done = steps if completed is None else completed
     numbered = {"step": Variable(step, ("time",), "1", "step")}
@@ -94,7 +94,7 @@ def rigid(steps=10, period=0.7, outcome="walked", completed=None):
 
 
 def contact(steps=10, period=0.71, outcome="walked", pads=True):
-    """The result of `contact-sim`."""
+    """Return the result of `contact-sim`."""
     time, step, angle, velocity = motion(steps, period, jumps=False)
     moving = trajectory(step, time, angle, velocity, 150.0) | ground(step, time, period)
     groups = {"trajectory": Group(moving), **walked(period, steps, slip_m=5e-4, rolling_m=4e-4)}
@@ -153,7 +153,7 @@ def compared(steps=10, period=0.7, aligned=True):
 
 
 def without(result, group, *names):
-    """The result as it is stored when no one asked for some variables."""
+    """Return the result as stored when some variables were not requested."""
     left = {name: variable for name, variable in result[group].variables.items() if name not in names}
     return stored(result.identity.stage, {**result.groups, group: Group(left)}, result.summary)
 

@@ -1,4 +1,4 @@
-"""Error against run time: every run is drawn, failures too, and nothing below what the reference knows."""
+"""Check that figures of error over run time show every run and failure, but no error below the reference's own."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figure 15 and the report's section on basins, of a grid made by hand."""
+"""Tests of figure 15 and of the report's section on basins, with a grid set by hand."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,7 @@
-"""What leaves a run for use elsewhere: figures, tables, trajectories, films."""
+"""Tests of exported figures, tables, trajectories and films."""
 
 import csv
+import io
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.provenance import begin
 from walkerlab.pipeline.store.runs import Record, RunFolder
 from walkerlab.views.cli.console import Console
-from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
+from walkerlab.views.cli.exports import Film, Target, export_from, gif, walk_in, write_film
 from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.stage import FIGURES
@@ -61,7 +62,7 @@ def run(original, tmp_path, monkeypatch):
     [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("eps", b"%!PS-Adobe"), ("tiff", b"II")],
 )
 def test_figure_is_exported_in_every_format(run, kind, start):
-    path = export_from(run, "figure-09", Target(kind, None), 516.0, "", QUIET)
+    path = export_from(run, "figure-09", Target(kind, None, width=516.0), "", QUIET)
     assert path.name == f"paper-figure-09.{kind}"
     assert path.read_bytes().startswith(start)
 
@@ -79,45 +80,45 @@ def test_exported_figure_equals_that_of_the_page(run, monkeypatch):
     drawn = plot.run(restrict(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
     assert {Path(entry["svg"]).stem for entry in drawn} == READERS_OF_RESULTS
     for name in READERS_OF_RESULTS:
-        path = export_from(run, name, Target("svg", None), FIGURE_WIDTH, "", QUIET)
+        path = export_from(run, name, Target("svg", None, width=FIGURE_WIDTH), "", QUIET)
         assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
 
 
 def test_figure_of_outdated_results_warns(run, capsys):
-    export_from(run, "figure-09", Target("svg", None), 516.0, "", Console())
+    export_from(run, "figure-09", Target("svg", None, width=516.0), "", Console())
     assert "outdated results, which are drawn anyway: compare, contact-sim and simulate;" in capsys.readouterr().err
 
 
 def test_figure_has_the_requested_width(run, tmp_path):
     for points in (252.0, 300.0):
-        file = Target("png", tmp_path / f"{points}.png")
-        with Image.open(export_from(run, "figure-09", file, points, "", QUIET)) as image:
+        file = Target("png", tmp_path / f"{points}.png", width=points)
+        with Image.open(export_from(run, "figure-09", file, "", QUIET)) as image:
             assert image.size[0] == pytest.approx(points / 72.0 * 300.0, abs=1.0)
 
 
 @pytest.mark.parametrize("kind", ["png", "tiff"])
 def test_image_has_the_requested_resolution(run, kind):
-    with Image.open(export_from(run, "figure-09", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
+    with Image.open(export_from(run, "figure-09", Target(kind, None, dpi=600), "", QUIET)) as image:
         assert image.size[0] == pytest.approx(3.5 * 600.0, abs=1.0)
         assert image.info["dpi"] == pytest.approx((600.0, 600.0), abs=0.1)
 
 
 def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
-    data = export_from(run, "figure-09", Target("pdf", None), 252.0, "", QUIET).read_bytes()
+    data = export_from(run, "figure-09", Target("pdf", None), "", QUIET).read_bytes()
     assert b"/Type3" not in data.replace(b" ", b"")
     assert b"/FontFile2" in data.replace(b" ", b"")
 
 
 def test_format_and_file_name_are_handled_consistently(run, tmp_path):
-    assert export_from(run, "trajectory", Target(None, None), 252.0, "simulate", QUIET).name == (
+    assert export_from(run, "trajectory", Target(None, None), "simulate", QUIET).name == (
         "paper-simulate-trajectory.csv"
     )
     for target in (Target("svg", tmp_path / "mine"), Target(None, tmp_path / "mine.svg")):
-        path = export_from(run, "figure-09", target, 252.0, "", QUIET)
+        path = export_from(run, "figure-09", target, "", QUIET)
         assert path == target.output
         assert path.read_bytes().startswith(b"<?xml")
     with pytest.raises(ConfigError, match="contradicts the ending"):
-        export_from(run, "figure-09", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
+        export_from(run, "figure-09", Target("pdf", tmp_path / "mine.svg"), "", QUIET)
     film = write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
     assert film.name == "paper-simulate.gif"
 
@@ -125,12 +126,12 @@ def test_format_and_file_name_are_handled_consistently(run, tmp_path):
 def test_nothing_is_overwritten_silently(run, capsys):
     target = Target("csv", Path("walk.csv"))
     for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv existed and was replaced.")):
-        export_from(run, "trajectory", target, 252.0, model, Console())
+        export_from(run, "trajectory", target, model, Console())
         assert told in capsys.readouterr().err
 
 
 def test_exported_csv_trajectory_equals_the_stored_one(run):
-    path = export_from(run, "trajectory", Target("csv", None), 516.0, "simulate", QUIET)
+    path = export_from(run, "trajectory", Target("csv", None), "simulate", QUIET)
     with path.open() as file:
         head, *rows = csv.reader(file)
     stored = both_models()["simulate"]["trajectory"]
@@ -141,7 +142,7 @@ def test_exported_csv_trajectory_equals_the_stored_one(run):
 
 
 def test_netcdf_trajectory_opens_without_a_group(run):
-    path = export_from(run, "trajectory", Target("nc", None), 516.0, "contact-sim", QUIET)
+    path = export_from(run, "trajectory", Target("nc", None), "contact-sim", QUIET)
     with xarray.open_dataset(path, engine="h5netcdf") as dataset:
         assert dataset["angle"].dims == ("time", "leg")
         assert dataset["time"].attrs["units"] == "s"
@@ -149,7 +150,7 @@ def test_netcdf_trajectory_opens_without_a_group(run):
 
 
 def test_latex_table_escapes_special_characters(run):
-    text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
+    text = export_from(run, "table-3", Target("tex", None), "", QUIET).read_text()
     assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
     assert escape_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
     assert escape_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
@@ -160,12 +161,12 @@ def test_latex_table_escapes_special_characters(run):
 
 @pytest.mark.parametrize("name", ["9", "09", "figure-9", "fig 9"])
 def test_figure_can_be_named_by_its_number(run, name):
-    assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-09.svg"
+    assert export_from(run, name, Target("svg", None), "", QUIET).name == "paper-figure-09.svg"
 
 
 def test_unknown_export_lists_what_the_run_has(run):
     with pytest.raises(ConfigError) as refused:
-        export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
+        export_from(run, "figur", Target("pdf", None), "", QUIET)
     assert "figure-09" in refused.value.advice
     assert refused.value.advice.endswith("\n  table-3\n  omitted-results\n  steps\n  trajectory")
     assert "figure-13" not in refused.value.advice
@@ -173,13 +174,13 @@ def test_unknown_export_lists_what_the_run_has(run):
 
 def test_unknown_export_suggests_a_similar_name(run):
     with pytest.raises(ConfigError, match=r"no item figure-03\.$"):
-        export_from(run, "figure-3", Target("pdf", None), 516.0, "", QUIET)
+        export_from(run, "figure-3", Target("pdf", None), "", QUIET)
 
 
 def test_figure_without_results_names_the_stage_that_makes_them(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
-            export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
+            export_from(run, name, Target("pdf", None), "", QUIET)
         assert refused.value.advice == f"Run `walkerlab {command} -c {run.quoted_path}` first."
 
 
@@ -200,7 +201,7 @@ def test_rigid_walk_is_the_default_without_a_contact_walk(run):
 )
 def test_impossible_export_is_explained(run, what, kind, error, said):
     with pytest.raises(error, match=said):
-        export_from(run, what, Target(kind, None), 516.0, "", QUIET)
+        export_from(run, what, Target(kind, None), "", QUIET)
 
 
 def test_number_of_film_frames_follows_from_duration_and_rate(run, tmp_path):
@@ -213,6 +214,23 @@ def test_number_of_film_frames_follows_from_duration_and_rate(run, tmp_path):
         first = np.asarray(film.convert("L"))
         film.seek(5)
         assert (np.asarray(film.convert("L")) != first).any()
+
+
+@pytest.mark.parametrize("rate", [24, 25, 30, 50])
+def test_gif_lasts_as_long_as_its_pictures_at_their_rate(rate):
+    pictures = np.zeros((3 * rate, 4, 4, 3), np.uint8)
+    pictures[np.arange(3 * rate), 0, 0] = np.arange(3 * rate)[:, None]
+    with Image.open(io.BytesIO(gif(pictures, rate))) as film:
+        total_ms = 0
+        for number in range(film.n_frames):
+            film.seek(number)
+            total_ms += film.info["duration"]
+    assert total_ms == 3000
+
+
+def test_gif_that_browsers_slow_down_is_rejected(run):
+    with pytest.raises(ConfigError, match="browsers slow a GIF above 50 frames per second"):
+        write_film(run, Target("gif", None), Film("simulate", 1, 60, 1.0), QUIET)
 
 
 def test_film_of_both_models_needs_both_walks(run, tmp_path):
@@ -247,8 +265,8 @@ DAMAGES = {
     "a bit flipped": lambda data: data[:600] + bytes([data[600] ^ 1]) + data[601:],
 }
 READERS = {
-    "figure": lambda run: export_from(run, "figure-06", Target("svg", None), 516.0, "", QUIET),
-    "trajectory": lambda run: export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET),
+    "figure": lambda run: export_from(run, "figure-06", Target("svg", None), "", QUIET),
+    "trajectory": lambda run: export_from(run, "trajectory", Target("csv", None), "contact-sim", QUIET),
     "film": lambda run: write_film(run, Target(None, Path("walk.gif")), Film("contact-sim", 1, 10, 1.0), QUIET),
 }
 
@@ -267,7 +285,7 @@ def test_damaged_result_is_reported_with_the_command_to_recompute_it(run, reader
 
 def test_damaged_results_that_are_not_needed_do_not_matter(run):
     run.artifact("simulate").write_bytes(b"")
-    assert export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET).is_file()
+    assert export_from(run, "trajectory", Target("csv", None), "contact-sim", QUIET).is_file()
 
 
 def test_damaged_result_is_reported_in_python(run):
@@ -282,15 +300,15 @@ def test_export_overwrites_no_result(run):
     before = run.artifact("simulate").read_bytes()
     for owned in ("simulate.h5", "later.h5", ".run.json"):
         with pytest.raises(ConfigError, match="belongs to the results of the run"):
-            export_from(run, "trajectory", Target("csv", run.path / owned), FIGURE_WIDTH, "simulate", QUIET)
+            export_from(run, "trajectory", Target("csv", run.path / owned, width=FIGURE_WIDTH), "simulate", QUIET)
     assert run.artifact("simulate").read_bytes() == before
     assert export_from(
-        run, "trajectory", Target("csv", run.path / "mine.csv"), FIGURE_WIDTH, "simulate", QUIET
+        run, "trajectory", Target("csv", run.path / "mine.csv", width=FIGURE_WIDTH), "simulate", QUIET
     ).is_file()
 
 
 def test_export_of_an_outdated_result_warns(run, capsys):
-    export_from(run, "trajectory", Target("csv", None), FIGURE_WIDTH, "simulate", Console())
+    export_from(run, "trajectory", Target("csv", None, width=FIGURE_WIDTH), "simulate", Console())
     assert f"warning: {run.artifact('simulate')} is out of date: " in capsys.readouterr().err
 
 
@@ -305,5 +323,5 @@ def test_film_of_an_older_result_without_needed_data_is_rejected(run):
 
 def test_exports_are_listed(run):
     with pytest.raises(ConfigError) as caught:
-        export_from(run, "99", Target(None, None), FIGURE_WIDTH, "simulate", QUIET)
+        export_from(run, "99", Target(None, None, width=FIGURE_WIDTH), "simulate", QUIET)
     assert {"  figure-07", "  trajectory"} <= set(caught.value.advice.splitlines())

@@ -1,4 +1,4 @@
-"""What the figures of families of gaits show."""
+"""Tests of the figures of families of gaits."""
 
 import re
 from dataclasses import replace

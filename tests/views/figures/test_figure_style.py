@@ -1,4 +1,4 @@
-"""What a demanding reader asks of every figure: labels with units, nothing clipped or covered, readable in grey."""
+"""Check every figure: labels with units, nothing clipped or covered, and readable in grey."""
 
 import itertools
 import re

@@ -1,4 +1,4 @@
-"""What the figures show, and when they are drawn."""
+"""Tests of what the figures show, and when they are drawn."""
 
 import functools
 import hashlib
@@ -51,7 +51,7 @@ def caption_of(figure, results):
 
 
 def lines_of(axes, look):
-    """The lines of a look's colour and width that show data."""
+    """Return the data lines of a look's colour and width."""
     return [
         line
         for line in axes.lines
@@ -128,7 +128,7 @@ def test_every_figure_has_a_text_and_every_text_a_figure():
 
 
 def module_of(figure):
-    """Where a figure is drawn."""
+    """Return the module that draws a figure."""
     return getattr(figure.draw, "func", figure.draw).__module__
 
 
@@ -240,7 +240,7 @@ def test_long_walk_shows_five_strides_and_says_so():
     assert caption.endswith("The rigid model walked 24 steps.")
 
 
-def test_fall_is_mentioned():
+def test_caption_mentions_a_fall():
     results = both_models(**{"contact-sim": contact(3, outcome="fell")})
     assert "the contact model took 3 steps (fell)" in caption_of(NUMBERED[7], results)
 
@@ -274,7 +274,7 @@ def test_limit_cycles_of_both_legs_have_equal_scales():
     assert one.get_ylim() == other.get_ylim()
 
 
-def test_last_stride_has_the_style_of_its_model_and_the_walk_is_thin():
+def test_last_stride_has_the_style_of_its_model_and_the_rest_is_thin():
     results = both_models()
     axes = plotted(NUMBERED[9], results).axes[0]
     (last,) = lines_of(axes, RIGID_LOOK)

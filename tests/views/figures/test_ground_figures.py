@@ -1,4 +1,4 @@
-"""The ground's forces and what it takes, from walks made by hand."""
+"""Tests of figures of the ground's forces and losses, with walks set by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Words of the figures of an identification."""
+"""Tests of the words in figures of an identification."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The stage that draws: files, index, and what is left out."""
+"""Tests of the stage `plot`: its files, its index, and the figures that it leaves out."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ WITHOUT_CONTACT = [LeftOut(name, "the config has no contact block") for name in 
 
 
 class Count:
-    """A progress that counts."""
+    """A progress that counts its calls."""
 
     def __init__(self):
         self.total, self.done = None, 0
@@ -45,7 +45,7 @@ def whole(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rigid_only(tmp_path_factory):
-    """The same of a run without contact, in a folder where something was drawn before."""
+    """Return the same for a run without contact, in a folder in which something was drawn before."""
     folder = tmp_path_factory.mktemp("rigid")
     (folder / "figures").mkdir()
     for name in ("figure-06.svg", "figure-02.png", "figure-mine.svg"):
@@ -55,7 +55,7 @@ def rigid_only(tmp_path_factory):
 
 
 def papers_left_out(content):
-    """The figures left out of those that these walks could draw: accuracy, tune and maps have no result here."""
+    """Return the figures left out of those that these walks could draw. Accuracy, tune and maps have no result here."""
     elsewhere = ("it needs accuracy", "it needs tune", "it needs stability-maps")
     return [entry for entry in content.summary["left_out"] if entry["why"] not in elsewhere]
 

@@ -1,4 +1,4 @@
-"""Figures of what gaits withstand: numbers of a sweep over one number, and of walks on rough ground."""
+"""Tests of the figures of robustness: sweeps over one number, and walks on rough ground."""
 
 import numpy as np
 import pytest

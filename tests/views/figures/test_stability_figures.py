@@ -1,4 +1,4 @@
-"""The maps of stability: every cell in its place and colour, and what has no error is not drawn as if it had one."""
+"""Tests of the stability maps: every cell has its place and colour, and a missing error is not drawn as one."""
 
 import numpy as np
 from matplotlib.colors import to_hex
@@ -18,7 +18,7 @@ def meshes(figure):
 
 
 def colours(mesh):
-    """The colour of each cell; None where nothing is drawn."""
+    """Return the colour of each cell, or None where nothing is drawn."""
     values = mesh.get_array()
     shown = [to_hex(colour) for colour in mesh.to_rgba(values).reshape(-1, 4)]
     hidden = np.ma.getmaskarray(values).ravel()

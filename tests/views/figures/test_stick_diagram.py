@@ -1,4 +1,4 @@
-"""The geometry of the stick diagrams: legs keep their length, feet stand where they stand."""
+"""Check the geometry of stick diagrams: legs keep their length, and stance feet their place."""
 
 from dataclasses import replace
 
@@ -124,7 +124,7 @@ def test_ground_without_pads_is_a_plane_explained_in_the_caption():
 
 
 def coloured(picture, look):
-    """How many of a picture's pixels have a leg's colour."""
+    """Return the number of a picture's pixels that have a leg's colour."""
     return int((picture == np.round(255.0 * np.array(to_rgb(look.colour))).astype(np.uint8)).all(axis=2).sum())
 
 

@@ -1,4 +1,4 @@
-"""Figures of sweeps over two parameters: lines where one has few values, a map where both have many."""
+"""Tests of figures of sweeps over two parameters: lines if one has few values, a map if both have many."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,9 @@ PARAMETERS = ("slope_deg", "hip_mass_kg")
 
 
 def swept(slopes, masses, answered=True):
-    """A multiplier that grows with the slope past one, on a grid; without an answer at its first point if told so."""
+    """Return a multiplier that grows with the slope past one, on a grid, optionally without an answer at its first
+    point.
+    """
     slope, mass = np.linspace(1.0, 5.0, slopes), np.linspace(5.0, 15.0, masses)
     radius = 0.3 * slope[:, None] + 0.01 * mass
     radius[0, 0] = radius[0, 0] if answered else np.nan
@@ -37,7 +39,7 @@ def drawn(made, group):
 
 
 @pytest.mark.parametrize(("slopes", "masses"), [(9, 3), (3, 9)])
-def test_parameter_with_few_values_becomes_lines(slopes, masses):
+def test_each_value_of_a_parameter_with_few_values_becomes_a_line(slopes, masses):
     group = swept(slopes, masses)
     figure = drawn(lines, group)
     curves = [line for line in figure.axes[0].lines if line.get_marker() == "o"]

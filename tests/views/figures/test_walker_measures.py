@@ -1,4 +1,4 @@
-"""The pictures of walkers' measures: they name what a config names, lie where it says, and are those of the docs."""
+"""Tests of the drawings of walkers: keys, places of the dimensions, and agreement with the docs."""
 
 import itertools
 import re
@@ -38,7 +38,7 @@ def pictures():
 
 
 def test_pictures_in_the_docs_are_current(pictures):
-    """Their words, that is: the shapes of letters and lines depend on the version of matplotlib."""
+    """Compare their words only: shapes of letters and lines depend on the version of matplotlib."""
     assert {name: words((SCRIPT["IMAGES"] / name).read_bytes()) for name in pictures} == {
         name: words(picture) for name, picture in pictures.items()
     }

@@ -1,4 +1,4 @@
-"""A page as a reader's program sees it."""
+"""Parse a page as a reader's program does."""
 
 from html.parser import HTMLParser
 
@@ -6,7 +6,7 @@ VOID = {"meta", "img", "input", "line", "polyline"}
 
 
 class Page(HTMLParser):
-    """What a reader's program sees of the page: elements, ids, texts by element."""
+    """A page as a screen reader sees it: elements, ids, texts by element."""
 
     def __init__(self, html):
         super().__init__()

@@ -1,4 +1,4 @@
-"""Compile tables with LaTeX, where it is installed."""
+"""Compile tables with LaTeX, if it is installed."""
 
 import shutil
 import subprocess

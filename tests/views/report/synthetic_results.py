@@ -1,4 +1,4 @@
-"""A small run as the report gets it: a real walk, with summaries of round values, in the layout that stages store."""
+"""A small run for the report: a real walk, with summaries of round values, in the layout of the stages."""
 
 import sys
 from dataclasses import replace
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.errata import Erratum
+from walkerlab.evidence.paper.study import Erratum
 from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.stage import FIGURES

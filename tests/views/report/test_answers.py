@@ -1,4 +1,4 @@
-"""What people read on stdout: a headline in words, symbols and units, digits that count, long rows cut short."""
+"""Tests of answers on stdout: a headline in words, symbols and units, digits that count, and shortened rows."""
 
 import csv
 
@@ -46,18 +46,18 @@ WALK = {
 
 
 def row(lines, head):
-    """What stands in the row of a table, without its head."""
+    """Return the cells of a table's row, without its head."""
     (found,) = (line for line in lines if line.startswith(f"{head}  "))
     return found.removeprefix(head).split()
 
 
 def said(lines):
-    """The lines as one, with ordinary spaces."""
+    """Join the lines, with ordinary spaces."""
     return " ".join(" ".join(lines).split())
 
 
 def cells(lines):
-    """The words of each line."""
+    """Return the words of each line."""
     return [line.split() for line in lines]
 
 

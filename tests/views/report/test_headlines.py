@@ -1,4 +1,4 @@
-"""Headline numbers: that a stage has them, and which those of an unknown stage are."""
+"""Tests of headline numbers, also of a stage that is not known."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The page of an identified walker in a real browser: the measured walk plays over the identified one."""
+"""Check in a real browser that the page of an identified walker plays both walks, measured and identified."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A kneed walker through the stages: gait, both models on plain ground, their comparison, and what the page says."""
+"""Run a kneed walker through the stages: gait, both models, their comparison, and the page."""
 
 import dataclasses
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from html_page import Page
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.compared_releases import CONTACT_STEPS, RELEASES
+from walkerlab.evidence.paper.compare import CONTACT_STEPS, RELEASES
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runs import RunFolder

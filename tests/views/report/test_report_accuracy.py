@@ -1,4 +1,4 @@
-"""The section on error against run time: every method, every failure, every reference."""
+"""Tests of the report's section on error and run time: every method, failure and reference."""
 
 import pytest
 from synthetic_results import config, fixedpoint, stored

@@ -1,4 +1,4 @@
-"""The report in a real browser: it asks for nothing, its player plays, every view follows, and no table overflows."""
+"""Use the report in a real browser: it loads nothing, its player plays, all views follow, and no table overflows."""
 
 import html
 import itertools
@@ -88,7 +88,7 @@ DRAWING = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9" onload="
 
 @pytest.fixture(scope="module")
 def hostile_folder(tmp_path_factory):
-    """A report whose every free text, from the config, the results and the figures, is hostile."""
+    """A report in which every free text, from the config, the results and the figures, is hostile."""
     folder = tmp_path_factory.mktemp("hostile")
     source = {
         "title": HOSTILE,

@@ -1,4 +1,4 @@
-"""What the report says of families of gaits."""
+"""Tests of the report's section on families of gaits."""
 
 from dataclasses import replace
 

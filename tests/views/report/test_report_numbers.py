@@ -1,4 +1,4 @@
-"""Numbers as the report prints them."""
+"""Tests of the numbers in the report."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The page as HTML: whole in itself, well-formed, accessible, and made of text that never becomes markup."""
+"""Tests of the page as HTML: self-contained, well-formed, accessible, and safe from markup in texts."""
 
 import base64
 import hashlib
@@ -195,7 +195,7 @@ def test_row_with_a_missing_cell_is_rejected():
         table("t", [Column("a"), Column("b")], [["only one"]])
 
 
-def test_script_is_small():
+def test_script_of_the_page_is_small():
     assert len(source("page.js").encode()) + len(source("player.js").encode()) < 30_000
 
 

@@ -1,4 +1,4 @@
-"""What the report says: the verdict first, and of everything else what there are results of."""
+"""Tests of the report's sections: the verdict first, and a section for each result there is."""
 
 import base64
 import subprocess
@@ -65,7 +65,7 @@ def plain(text):
 
 
 def texts(section):
-    """Everything that a section says, in one string."""
+    """Return everything that a section says, in one string."""
     return plain(repr(section.blocks).replace("\\xa0", " "))
 
 
@@ -94,7 +94,7 @@ def test_each_result_adds_its_sections():
     assert {"paper-numbers", "errata"} <= sections(["compare"]).keys()
 
 
-def test_only_the_lead_mentions_a_missing_contact_model():
+def test_only_the_opening_paragraph_mentions_a_missing_contact_model():
     found = sections(["fixedpoint", "simulate"], sets=("contact=null",))
     assert not {"contact", "paper-numbers", "errata"} & found.keys()
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
@@ -164,7 +164,7 @@ def test_spring_alone_is_not_a_drive():
     assert "driven" not in plain(sections(sets=sprung)["verdict"].blocks[0].text)
 
 
-def test_columns_of_work_within_rounding_are_omitted():
+def test_energy_columns_that_are_zero_to_rounding_are_omitted():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
     told = [column.title for column in works(str) if column.value(record) is not None]
     assert told == ["work of the push-off per step (J)"]
@@ -385,7 +385,7 @@ def test_provenance_lists_key_digest_commit_and_command_of_each_result():
 
 
 def channels(walker):
-    """The numbers of a player's walker, by their names."""
+    """Return the numbers of a player's walker, by name."""
     floats = np.frombuffer(base64.b64decode(walker.track.pack()), "<f4").reshape(len(walker.track.channels), -1)
     return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 
@@ -464,13 +464,13 @@ def test_report_imports_no_plotting_or_compiler():
     assert done.stdout.strip() == "[]"
 
 
-def test_lead_names_config_change_slope_and_equations():
+def test_opening_paragraph_names_config_change_slope_and_equations():
     said = plain(lead(config("slope_deg=3", "equations=as-printed"), "paper@slope_deg=3"))
     for part in ("Config paper", "changed by slope_deg=3", "0.05236 rad (3°)", "as the paper prints them", "2 strides"):
         assert part in said
 
 
-def test_lead_lists_the_features_of_the_walker():
+def test_opening_paragraph_lists_the_features_of_the_walker():
     torso = {"mass_kg": 0.5, "above_hip_m": 0.2}
     kneed, compass = (load(Path(name)).config for name in ("kneed", "torso"))
     said = plain(lead(load(Path("kneed"), [f"walker.torso={torso}"]).config, "kneed"))

@@ -1,4 +1,4 @@
-"""The stage: from results and drawn files to one file and its index."""
+"""Tests of the stage `report`, which makes one file and its index from results and figures."""
 
 import hashlib
 

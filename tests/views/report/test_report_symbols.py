@@ -1,4 +1,4 @@
-"""Plain spellings of formulas become the signs that a reader expects, and prose stays prose."""
+"""Check that formulas in plain spelling get their signs, and that prose is not changed."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Results made by hand are laid out as small real runs of the stages store theirs: groups, variables, keys."""
+"""Check that results set by hand have the layout of small real runs: groups, variables, keys."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Tables for LaTeX: aligned decimals, one number of digits a column, heads and captions in words."""
+"""Tests of LaTeX tables: aligned decimals, one number of digits per column, and heads and captions in words."""
 
 import pytest
 from latex import compile_tables

@@ -1,4 +1,4 @@
-"""A whole report of real results, kept short: sections and the results made by hand know the keys that stages store."""
+"""Tests of a whole, short report of real results: sections and synthetic results know the keys that stages store."""
 
 import functools
 
@@ -53,7 +53,7 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def results(run):
-    """What the report was made of."""
+    """Return the results from which the report was made."""
     config, folder, _ = run
     return Results(config, {name: artifact.read(folder.artifact(name)) for name in STAGES})
 
@@ -79,13 +79,13 @@ def test_every_table_can_be_exported_by_its_caption(run, tmp_path, monkeypatch):
         texts = []
         for kind in ("csv", "tex"):
             file = tmp_path / f"{number}.{kind}"
-            texts.append(export_from(folder, caption, Target(None, file), 252.0, "", Console(quiet=True)).read_text())
+            texts.append(export_from(folder, caption, Target(None, file), "", Console(quiet=True)).read_text())
         heads.add(texts[0].splitlines()[0])
         assert "\n\\begin{table}\n\\centering\n\\caption{" + caption[:5] in texts[1]
         assert not set("θωφμλ₁₂⁻−×") & set(texts[1])
     assert len(heads) > 10
     with pytest.raises(ConfigError) as refused:
-        export_from(folder, "no-such-thing", Target(None, None), 252.0, "", Console(quiet=True))
+        export_from(folder, "no-such-thing", Target(None, None), "", Console(quiet=True))
     assert "the-contact-models-walk" in refused.value.advice
 
 

@@ -12,17 +12,13 @@ import numpy as np
 from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
 from walkerlab.evidence.benchmarks.trials import (
     USER_SCRIPT,
-    End,
-    Reference,
     RigidTrial,
     Trial,
     TrialRun,
-    WalkEndsError,
     contact_trial,
-    first_end,
-    second_end,
     stiff_ground_trial,
 )
 from walkerlab.evidence.benchmarks.words import words

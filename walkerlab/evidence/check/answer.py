@@ -14,9 +14,10 @@ from walkerlab.config.check import Check
 from walkerlab.config.problems import suggestion
 from walkerlab.config.reads import CheckConfig
 from walkerlab.errors import ConfigError
+from walkerlab.evidence.check import plain_walker as plain
 from walkerlab.evidence.check.explanations import Explanation, Question, advise, explain, find_periodic_changes
 from walkerlab.evidence.check.gaits import CheckedStep, Convention, Values, gait_near, put_feet_on_slope, stated
-from walkerlab.evidence.check.plain_walker import EXACT, Floats, PlainStep, PlainWalker, plain_walker, why_not_plain
+from walkerlab.evidence.check.plain_walker import EXACT, Floats, PlainStep, PlainWalker
 from walkerlab.evidence.check.printed import EXACT_ERROR, UNEXPLAINED, Item, Verdict, items_of, judge, spell_name
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
@@ -71,7 +72,7 @@ class Checked:
 
     @cached_property
     def walker(self) -> PlainWalker:
-        return plain_walker(self.config)
+        return plain.plain_walker(self.config)
 
     @cached_property
     def items(self) -> list[Item]:
@@ -126,7 +127,7 @@ class Checked:
             rates = gait.state[len(names) // 2 :]
             extra = (rates[2],) if self.walker.kneed and self.walker.free_at_strike else ()
             start = np.array([*(angle + self.walker.slope for angle in gait.state[:2]), *rates[:2], *extra])
-            step = self.walker.step(start)
+            step = plain.take_step(self.walker, start)
             if step is not None:
                 found[CheckedStep(self.walker, start, step)] = values_of(gait_summary(gait))
         return found
@@ -135,8 +136,8 @@ class Checked:
     def right(self) -> CheckedStep:
         """The right gait nearest to the printed one."""
         nearest = min(self.gaits, key=self.distance)
-        printed = self.printed_state("state", self.walker.full_state(nearest.start))
-        start = None if printed is None else self.walker.start_from(printed[0], self.convention.instant)
+        printed = self.printed_state("state", plain.full_state(self.walker, nearest.start))
+        start = None if printed is None else plain.start_from(self.walker, printed[0], self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
         # The search of the compiled model may miss a gait near the printed state.
@@ -162,18 +163,18 @@ class Checked:
         """Printed values to explain."""
         values = self.right.values(self.items, self.convention)
         items = [item for item in self.items if values[item.name] is not None]
-        printed = self.printed_state("state", self.walker.full_state(self.right.start))
+        printed = self.printed_state("state", plain.full_state(self.walker, self.right.start))
         return Question(self.config, items, self.convention, self.right, printed and printed[0], [*self.gaits])
 
     @cached_property
     def printed_step(self) -> PrintedStep | None:
         """A step from the printed state, or None if no state of both legs is printed."""
-        printed = self.printed_state("state", self.walker.full_state(self.right.start))
+        printed = self.printed_state("state", plain.full_state(self.walker, self.right.start))
         if printed is None or not {"swing", "stance"}.issubset(self.convention.order):
             return None
-        start = self.walker.start_from(printed[0], self.convention.instant)
-        step = None if start is None else self.walker.step(start)
-        return PrintedStep(start, step, self.walker.coordinates(printed[1]))
+        start = plain.start_from(self.walker, printed[0], self.convention.instant)
+        step = None if start is None else plain.take_step(self.walker, start)
+        return PrintedStep(start, step, plain.coordinates(self.walker, printed[1]))
 
 
 class PrintedStep(NamedTuple):
@@ -204,7 +205,7 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
     if check is None:
         raise ConfigError("the config has no check block.", "`walkerlab init FILE --check` writes one to fill in.")
     refuse_unknown(check)
-    if reason := why_not_plain(config):
+    if reason := plain.why_not_plain(config):
         return answer_without(check, f"{reason}, so no second route confirms the right values")
     checked = Checked(config, check)
     items = checked.items  # raises ConfigError if states do not fit the walker
@@ -270,7 +271,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
     start, step, rounding = printed
     if start is None or step is None:
         return {"residual": None, "digits": 0, "is_periodic": False}
-    unit = walker.scales(len(start))
+    unit = plain.scales(walker, len(start))
     residual = np.abs(step.after - start)
     # change over the step that the rounding of the printed state explains
     allowed = np.abs(right.derivative - np.eye(len(start))) @ rounding + EXACT_ERROR * unit
@@ -283,7 +284,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
         "is_periodic": bool(np.all(residual <= allowed)),
         "distance_from_gait": float((np.abs(start - right.start) / unit).max()),
         "distance_after_a_step": float((np.abs(step.after - right.start) / unit).max()),
-        "state_after_step": checked.convention.write(walker, walker.full_state(step.after)),
+        "state_after_step": checked.convention.write(walker, plain.full_state(walker, step.after)),
     }
     if checked.convention.origin == "vertical" and checked.convention.instant == "after-strike":
         # both feet stand on the slope that the legs' angles have
@@ -299,7 +300,7 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
         return []
     start = own.start
     rounding = own.rounding
-    printed = checked.printed_state("state_before", walker.full_state(right.step.before))
+    printed = checked.printed_state("state_before", plain.full_state(walker, right.step.before))
     if printed is not None:
         n = len(printed[0]) // 2
         before, moved = (values[[0, 1, n, n + 1]] for values in printed)
@@ -308,7 +309,7 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
         before = own.step.before
     else:
         return []
-    M, momentum = walker.strike_balances(before)
+    M, momentum = plain.strike_balances(walker, before)
     # the momenta before change with rounded angles and rates about as much as those after
     size = np.abs(start[2:]).max()
     allowed = 2.0 * np.abs(M).sum(axis=1) * (rounding[2:].max() + size * rounding[:2].max() + EXACT_ERROR)
@@ -321,7 +322,9 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
             "conserved": bool(abs(residual) <= limit),
             "before": "computed from the printed state" if printed is None else "printed",
         }
-        for about, row, residual, limit in zip(walker.balances(), M, M @ start[2:] - momentum, allowed, strict=True)
+        for about, row, residual, limit in zip(
+            plain.name_balances(walker), M, M @ start[2:] - momentum, allowed, strict=True
+        )
     ]
 
 
@@ -356,7 +359,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
     """Compare both routes: the compiled model's gait must return to itself in the plain model."""
-    unit = gait.walker.scales(len(gait.start))
+    unit = plain.scales(gait.walker, len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())
     difference = max(difference, abs(period - gait.step.period) / gait.walker.pendulum_time)

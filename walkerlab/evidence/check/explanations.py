@@ -21,16 +21,9 @@ import numpy as np
 
 from walkerlab.config.fields import replace_key, short_number
 from walkerlab.config.reads import RigidConfig, flatten
+from walkerlab.evidence.check import plain_walker as plain
 from walkerlab.evidence.check.gaits import GRAVITIES, CheckedStep, Convention, alternatives, gait_near
-from walkerlab.evidence.check.plain_walker import (
-    EXACT,
-    QUICK,
-    Floats,
-    Mistake,
-    PlainWalker,
-    list_mistakes,
-    plain_walker,
-)
+from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, Mistake, PlainWalker
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
@@ -81,7 +74,7 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
     """Return the plain walker with another value of one parameter, or None if it cannot be built."""
     own: dict[str, Any] = {FIELDS[key]: value} if key in FIELDS else {}
     changed = None if own else replace_key(config.walker, key.removeprefix("walker."), value)
-    walker = replace(plain_walker(config, changed), **own)
+    walker = replace(plain.plain_walker(config, changed), **own)
     turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts[: 1 + walker.kneed])
     return walker if turns and walker.leg_length > walker.radius >= 0.0 < walker.gravity else None
 
@@ -167,8 +160,8 @@ class Question:
     def explained_by(self, candidate: Candidate, gait: CheckedStep) -> Explanation | None:
         """Return what a candidate's gait explains, or None if it explains too little.
 
-        The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
-        right.
+        Of the printed numbers, at least three must be wrong, and the gait must reproduce every digit of all of them, or
+        at least of the states.
         """
         if self.reproduced(gait, self.state_items) != self.state_items:
             return None
@@ -193,8 +186,10 @@ class Question:
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
-        start = self.right.start if self.state is None else walker.start_from(self.state, self.convention.instant)
-        step = None if start is None else walker.step(start, tolerance)
+        start = (
+            self.right.start if self.state is None else plain.start_from(walker, self.state, self.convention.instant)
+        )
+        step = None if start is None else plain.take_step(walker, start, tolerance)
         if step is None or start is None or self.right.derivative is None:
             return None
         move = np.linalg.solve(np.eye(len(start)) - self.right.derivative, step.after - start)
@@ -202,7 +197,7 @@ class Question:
             return None
         # a value may be printed that the state alone does not determine
         quantities = {self.convention.instant, *(item.quantity for item in self.quick_items)}
-        after = step if quantities == {"after-strike", "state"} else walker.step(start + move, tolerance)
+        after = step if quantities == {"after-strike", "state"} else plain.take_step(walker, start + move, tolerance)
         return None if after is None else CheckedStep(walker, start + move, after)
 
     def attempt(self, candidate: Candidate, guess: CheckedStep | None) -> Iterator[Attempt]:
@@ -271,7 +266,7 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     near = NEARLY * min((miss for miss, _ in closer), default=0.0)
     closer.sort(key=lambda each: (len(each[1].differences(question.convention)), each[0]))
     for other in [other for miss, other in closer if miss <= near][:READINGS]:
-        state = other.read(walker, [item.value for item in items], walker.full_state(question.right.start))
+        state = other.read(walker, [item.value for item in items], plain.full_state(walker, question.right.start))
         yield join_words(other.differences(question.convention)), replace(question, convention=other, state=state)
 
 
@@ -291,7 +286,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    mistakes = [*list_mistakes(question.walker)]
+    mistakes = [*plain.list_mistakes(question.walker)]
     candidates = [Candidate("mistake", each.what, each.of_size(0.0)) for each in mistakes if not each.first]
     candidates += generate_misprints(question.config)
     for place, candidate in enumerate(candidates):
@@ -389,7 +384,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
     yield from (("", gait) for gait in question.gaits)
     walker = question.walker
-    printed = None if question.state is None else walker.start_from(question.state, question.convention.instant)
+    printed = None if question.state is None else plain.start_from(walker, question.state, question.convention.instant)
     starts = [start for start in (printed, question.right.start) if start is not None]
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.check import Check, Instant
 from walkerlab.errors import ConfigError
+from walkerlab.evidence.check import plain_walker as plain
 from walkerlab.evidence.check.plain_walker import BENT, EXACT, SHANK, STANCE, SWING, Floats, PlainStep, PlainWalker
 from walkerlab.evidence.check.printed import Item, match_multipliers
 
@@ -106,7 +107,7 @@ class Convention:
         return self.arrange(np.stack((K @ (angles - tilt), K @ rates * self.rate_factor(walker))))
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
-        """Return the state that printed numbers describe. Bodies that are not printed move as in the state `known`."""
+        """Return the state that printed numbers describe. Bodies without printed numbers move as in `known`."""
         n = len(known) // 2
         count = len(self.order)
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
@@ -185,13 +186,13 @@ def alternatives(convention: Convention) -> list[Convention]:
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
     """Return the derivative of the step map at a start by central differences, or None where a step fails."""
     columns = []
-    moves = DIFFERENCE * walker.scales(len(start))
+    moves = DIFFERENCE * plain.scales(walker, len(start))
     for k, move in enumerate(moves):
         ends = []
         for sign in (1.0, -1.0):
             moved = start.copy()
             moved[k] += sign * move
-            ends.append(walker.step(moved, tolerance))
+            ends.append(plain.take_step(walker, moved, tolerance))
         if ends[0] is None or ends[1] is None:
             return None
         columns.append((ends[0].after - ends[1].after) / (2.0 * move))
@@ -270,7 +271,7 @@ class CheckedStep:
         vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
         """
         if instant != "mid-stance":
-            return self.walker.full_state(self.start if instant == "after-strike" else self.step.before)
+            return plain.full_state(self.walker, self.start if instant == "after-strike" else self.step.before)
         upright = self.walker.slope if vertical else 0.0
 
         def lean(state: Floats) -> float:
@@ -279,9 +280,9 @@ class CheckedStep:
         for piece in self.step.pieces:
             # The stance leg falls forwards, so its angle decreases.
             if piece.start[STANCE] > upright >= piece.end[STANCE]:
-                middle = self.walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
+                middle = plain.swing_until(self.walker, piece.phase, piece.start, lean, lambda _: True, EXACT)
                 if middle is not None:
-                    return middle.end if middle.phase == BENT else self.walker.full_state(middle.end)
+                    return middle.end if middle.phase == BENT else plain.full_state(self.walker, middle.end)
         return None
 
 
@@ -290,13 +291,13 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> Ch
 
     A  derivative of the step map of a similar walker, with which the search begins
     """
-    unit = walker.scales(len(start))
+    unit = plain.scales(walker, len(start))
     best: CheckedStep | None = None
     x: Floats = np.array(start, float)
     last = math.inf
     is_own = False  # whether A is this walker's own derivative
     for _ in range(MAX_MOVES):
-        step = walker.step(x)
+        step = plain.take_step(walker, x)
         size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
         if step is not None and size < last:
             best = CheckedStep(walker, x, step)

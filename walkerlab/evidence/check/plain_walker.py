@@ -25,6 +25,7 @@ from scipy.integrate import DOP853
 from scipy.linalg.lapack import dposv
 
 from walkerlab.config.check import Instant
+from walkerlab.config.drives import LINEAR
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
@@ -216,172 +217,87 @@ class PlainWalker:
         heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
         return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
 
-    def balances(self) -> tuple[str, ...]:
-        """Describe the bodies and points about which a heel strike conserves angular momentum."""
-        names = ("the whole walker about the new foot", "the trailing leg about the hip")
-        return (*names, "the trailing shank about its knee") if self.kneed and self.free_at_strike else names
 
-    def strike_balances(self, before: Floats) -> tuple[Floats, Floats]:
-        """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
+def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
+    """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
+    if not walker.kneed:
+        return coordinates[:4]
+    shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
+    return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
 
-        before  state just before it, swing leg straight
-        """
-        Z = REDUCTIONS[BENT if self.free_at_strike else STRAIGHT]
-        old_angles, old = self.bodies(STRAIGHT, before)
-        foot, radius = (self.foot, self.radius) if self.strike_foot is None else (self.strike_foot, 0.0)
-        pivot = (foot, radius) if self.turned_on_it else (self.foot, self.radius)
-        moving = self.levers_about(*pivot) * np.exp(1j * old_angles) @ old
-        # the legs exchange their roles
-        angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
-        places = self.levers_about(foot, radius) * np.exp(1j * angles)
-        inertias = self.inertias * [*[self.strike_inertia] * 3, 1.0, 0.0]
-        # The masses of both legs change places, as their angles do above.
-        momentum = (places.conj().T * self.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
-        if self.push_off:
-            # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
-            to_hip = -self.foot * cmath.exp(1j * angles[SWING]) + 1j * self.radius
-            hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
-            momentum[STANCE] += self.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real
-        n = Z.shape[1]
-        # whole walker, trailing leg and, if it is free, trailing shank
-        T = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]])[:n, :n] @ Z.T
-        M = T @ self.mass_matrix(places, inertias) @ Z
-        momentum = T @ momentum
-        momentum[1] -= self.leg_inertia * float(np.dot(self.extra_inertia, omega[:2]))
-        if self.keeps_trailing_rate:
-            M[1], momentum[1] = 0.0, omega[SWING]
-            M[1, SWING] = 1.0
-        return M, momentum
 
-    def after_strike(self, before: Floats) -> Floats:
-        """Return the coordinates just after a heel strike: angles of swing and stance leg, and all rates."""
-        M, momentum = self.strike_balances(before)
-        angles = before[[STANCE, SWING]]
-        if self.evens_angles:
-            angles[STANCE] = -2.0 * self.lean - angles[SWING]
-        return np.concatenate((angles, np.linalg.solve(M, momentum)))
+def coordinates(walker: PlainWalker, state: Floats) -> Floats:
+    """Return the coordinates just after a heel strike from the state of all bodies."""
+    n = len(state) // 2
+    return np.concatenate((state[:2], state[n : n + 2 + int(walker.kneed and walker.free_at_strike)]))
 
-    def full_state(self, coordinates: Floats) -> Floats:
-        """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
-        if not self.kneed:
-            return coordinates[:4]
-        shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
-        return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
 
-    def coordinates(self, state: Floats) -> Floats:
-        """Return the coordinates just after a heel strike from the state of all bodies."""
-        n = len(state) // 2
-        return np.concatenate((state[:2], state[n : n + 2 + int(self.kneed and self.free_at_strike)]))
+def scales(walker: PlainWalker, size: int) -> Floats:
+    """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
+    return np.array([1.0, 1.0, *[1.0 / walker.pendulum_time] * (size - 2)])
 
-    def start_from(self, state: Floats, instant: Instant) -> Floats | None:
-        """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
-        if instant == "after-strike":
-            return self.coordinates(state)
-        n = len(state) // 2
-        if instant == "before-strike":
-            return self.after_strike(np.concatenate((state[:2], state[n : n + 2])))
-        landed = self.land(state)
-        return None if landed is None else self.after_strike(landed[-1].end)
 
-    def scales(self, size: int) -> Floats:
-        """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
-        return np.array([1.0, 1.0, *[1.0 / self.pendulum_time] * (size - 2)])
+# ---- strikes ---------------------------------------------------------------------------------------------------------
 
-    def step(self, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
-        """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
 
-        start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
-        """
-        pieces = self.land(self.full_state(start), tolerance)
-        if pieces is None:
-            return None
-        before = pieces[-1].end
-        length = self.swing_foot(before).real - self.radius * (before[STANCE] - start[STANCE])
-        period = sum(piece.duration for piece in pieces)
-        return PlainStep(period, length, before, self.after_strike(before), pieces)
+def name_balances(walker: PlainWalker) -> tuple[str, ...]:
+    """Describe the bodies and points about which a heel strike conserves angular momentum."""
+    names = ("the whole walker about the new foot", "the trailing leg about the hip")
+    return (*names, "the trailing shank about its knee") if walker.kneed and walker.free_at_strike else names
 
-    def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
-        """Return the parts of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
-        pieces: tuple[Piece, ...] = ()
-        # A straight leg whose foot is behind the stance foot has just been released.
-        if self.kneed and (self.knee_bend(state) != 0.0 or self.swing_foot(state).real < 0.0):
-            locked = self.swing(BENT, state, self.knee_bend, lambda _: True, tolerance)
-            if locked is None:
-                return None
-            pieces = (locked,)
-            state = self.after_knee_strike(locked.end)
-        elif self.kneed:
-            state = state[[SWING, STANCE, 3 + SWING, 3 + STANCE]]
-        landed = self.swing(STRAIGHT, state, self.feet_apart, lambda end: self.swing_foot(end).real > 0.0, tolerance)
-        return None if landed is None else (*pieces, landed)
 
-    def swing(
-        self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
-    ) -> Piece | None:
-        """Integrate until `event` falls to zero in a state for which `counts` is true. None if that never happens."""
-        old_time = 0.0
-        old = start
-        before = event(start)
-        for time, state in self.course(phase, start, tolerance):
-            after = event(state)
-            # Both feet are on the slope at the start, too, and a straight leg scuffs in mid-swing. Neither is a fall
-            # from above.
-            if before > 0.0 >= after:
-                share = before / (before - after) if self.interpolates else 1.0
-                move = float(share * (time - old_time))
-                end = old + share * (state - old)
-                if not self.euler_step:
-                    move, end = self.locate(phase, old, event, move, tolerance)
-                if counts(end):
-                    return Piece(phase, start, float(old_time) + move, end)
-            if abs(state[STANCE]) > FALLEN:
-                return None
-            old_time = time
-            old = state
-            before = after
-        return None
+def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats]:
+    """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
 
-    def course(self, phase: str, state: Floats, tolerance: float) -> Iterator[tuple[float, Floats]]:
-        """Yield the times and states to which the steps of an integration lead."""
-        latest = LONGEST_SWING * self.pendulum_time
-        if self.euler_step:
-            for count in range(1, min(int(latest / self.euler_step), MAX_EULER_STEPS)):
-                state = state + self.euler_step * self.rates(phase, state)
-                yield self.euler_step * count, state
-            return
-        solver = self.solver(phase, state, latest, tolerance)
-        while solver.status == "running":
-            solver.step()
-            yield solver.t, solver.y
+    before  state just before it, swing leg straight
+    """
+    Z = REDUCTIONS[BENT if walker.free_at_strike else STRAIGHT]
+    old_angles, old = walker.bodies(STRAIGHT, before)
+    foot, radius = (walker.foot, walker.radius) if walker.strike_foot is None else (walker.strike_foot, 0.0)
+    pivot = (foot, radius) if walker.turned_on_it else (walker.foot, walker.radius)
+    moving = walker.levers_about(*pivot) * np.exp(1j * old_angles) @ old
+    # the legs exchange their roles
+    angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
+    places = walker.levers_about(foot, radius) * np.exp(1j * angles)
+    inertias = walker.inertias * [*[walker.strike_inertia] * 3, 1.0, 0.0]
+    # The masses of both legs change places, as their angles do above.
+    momentum = (places.conj().T * walker.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
+    if walker.push_off:
+        # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
+        to_hip = -walker.foot * cmath.exp(1j * angles[SWING]) + 1j * walker.radius
+        hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
+        momentum[STANCE] += walker.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real
+    n = Z.shape[1]
+    # whole walker, trailing leg and, if it is free, trailing shank
+    T = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]])[:n, :n] @ Z.T
+    M = T @ walker.mass_matrix(places, inertias) @ Z
+    momentum = T @ momentum
+    momentum[1] -= walker.leg_inertia * float(np.dot(walker.extra_inertia, omega[:2]))
+    if walker.keeps_trailing_rate:
+        M[1], momentum[1] = 0.0, omega[SWING]
+        M[1, SWING] = 1.0
+    return M, momentum
 
-    def solver(self, phase: str, state: Floats, end: float, tolerance: float) -> DOP853:
-        def rates(_time: float, state: Floats) -> Floats:
-            return self.rates(phase, state)
 
-        scale = np.repeat((1.0, 1.0 / self.pendulum_time), len(state) // 2)
-        largest = LARGEST_STEP * self.pendulum_time
-        return DOP853(rates, 0.0, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
+def after_strike(walker: PlainWalker, before: Floats) -> Floats:
+    """Return the coordinates just after a heel strike: angles of swing and stance leg, and all rates."""
+    M, momentum = strike_balances(walker, before)
+    angles = before[[STANCE, SWING]]
+    if walker.evens_angles:
+        angles[STANCE] = -2.0 * walker.lean - angles[SWING]
+    return np.concatenate((angles, np.linalg.solve(M, momentum)))
 
-    def locate(self, phase: str, state: Floats, event: Event, move: float, tolerance: float) -> tuple[float, Floats]:
-        """Return when and in which state an event is zero, by Newton's method. The first guess is a time `move`."""
-        time = 0.0
-        for _ in range(LOCATING_ROUNDS):
-            time += move
-            solver = self.solver(phase, state, move, tolerance)
-            while solver.status == "running":
-                solver.step()
-            state = solver.y
-            value = event(state)
-            move = float(-TINY * value / (event(state + TINY * self.rates(phase, state)) - value))
-        return time, state
 
-    def after_knee_strike(self, state: Floats) -> Floats:
-        """Return the state with a straight leg just after the knee has locked."""
-        Z = REDUCTIONS[STRAIGHT]
-        angles, omega = self.bodies(BENT, state)
-        M = self.mass_matrix(self.levers * np.exp(1j * angles), self.inertias)
-        # The impact acts within the leg, so it does not change the momenta of the coordinates that remain.
-        return np.concatenate((state[:2], np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ omega)))
+def after_knee_strike(walker: PlainWalker, state: Floats) -> Floats:
+    """Return the state with a straight leg just after the knee has locked."""
+    Z = REDUCTIONS[STRAIGHT]
+    angles, omega = walker.bodies(BENT, state)
+    M = walker.mass_matrix(walker.levers * np.exp(1j * angles), walker.inertias)
+    # The impact acts within the leg, so it does not change the momenta of the coordinates that remain.
+    return np.concatenate((state[:2], np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ omega)))
+
+
+# ---- steps -----------------------------------------------------------------------------------------------------------
 
 
 class Piece(NamedTuple):
@@ -408,13 +324,125 @@ class PlainStep(NamedTuple):
         return self.pieces[0].duration if len(self.pieces) > 1 else None
 
 
+def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats | None:
+    """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
+    if instant == "after-strike":
+        return coordinates(walker, state)
+    n = len(state) // 2
+    if instant == "before-strike":
+        return after_strike(walker, np.concatenate((state[:2], state[n : n + 2])))
+    landed = land(walker, state)
+    return None if landed is None else after_strike(walker, landed[-1].end)
+
+
+def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
+    """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
+
+    start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
+    """
+    pieces = land(walker, full_state(walker, start), tolerance)
+    if pieces is None:
+        return None
+    before = pieces[-1].end
+    length = walker.swing_foot(before).real - walker.radius * (before[STANCE] - start[STANCE])
+    period = sum(piece.duration for piece in pieces)
+    return PlainStep(period, length, before, after_strike(walker, before), pieces)
+
+
+def land(walker: PlainWalker, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
+    """Return the parts of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
+    pieces: tuple[Piece, ...] = ()
+    # A straight leg whose foot is behind the stance foot has just been released.
+    if walker.kneed and (walker.knee_bend(state) != 0.0 or walker.swing_foot(state).real < 0.0):
+        locked = swing_until(walker, BENT, state, walker.knee_bend, lambda _: True, tolerance)
+        if locked is None:
+            return None
+        pieces = (locked,)
+        state = after_knee_strike(walker, locked.end)
+    elif walker.kneed:
+        state = state[[SWING, STANCE, 3 + SWING, 3 + STANCE]]
+    landed = swing_until(
+        walker, STRAIGHT, state, walker.feet_apart, lambda end: walker.swing_foot(end).real > 0.0, tolerance
+    )
+    return None if landed is None else (*pieces, landed)
+
+
+def swing_until(
+    walker: PlainWalker, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
+) -> Piece | None:
+    """Integrate until `event` falls to zero in a state for which `counts` is true. None if that never happens."""
+    old_time = 0.0
+    old = start
+    before = event(start)
+    for time, state in course(walker, phase, start, tolerance):
+        after = event(state)
+        # Both feet are on the slope at the start, too, and a straight leg scuffs in mid-swing. Neither is a fall
+        # from above.
+        if before > 0.0 >= after:
+            share = before / (before - after) if walker.interpolates else 1.0
+            move = float(share * (time - old_time))
+            end = old + share * (state - old)
+            if not walker.euler_step:
+                move, end = locate(walker, phase, old, event, move, tolerance)
+            if counts(end):
+                return Piece(phase, start, float(old_time) + move, end)
+        if abs(state[STANCE]) > FALLEN:
+            return None
+        old_time = time
+        old = state
+        before = after
+    return None
+
+
+def course(walker: PlainWalker, phase: str, state: Floats, tolerance: float) -> Iterator[tuple[float, Floats]]:
+    """Yield the times and states to which the steps of an integration lead."""
+    latest = LONGEST_SWING * walker.pendulum_time
+    if walker.euler_step:
+        for count in range(1, min(int(latest / walker.euler_step), MAX_EULER_STEPS)):
+            state = state + walker.euler_step * walker.rates(phase, state)
+            yield walker.euler_step * count, state
+        return
+    solver = new_solver(walker, phase, state, latest, tolerance)
+    while solver.status == "running":
+        solver.step()
+        yield solver.t, solver.y
+
+
+def new_solver(walker: PlainWalker, phase: str, state: Floats, end: float, tolerance: float) -> DOP853:
+    def rates(_time: float, state: Floats) -> Floats:
+        return walker.rates(phase, state)
+
+    scale = np.repeat((1.0, 1.0 / walker.pendulum_time), len(state) // 2)
+    largest = LARGEST_STEP * walker.pendulum_time
+    return DOP853(rates, 0.0, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
+
+
+def locate(
+    walker: PlainWalker, phase: str, state: Floats, event: Event, move: float, tolerance: float
+) -> tuple[float, Floats]:
+    """Return when and in which state an event is zero, by Newton's method. The first guess is a time `move`."""
+    time = 0.0
+    for _ in range(LOCATING_ROUNDS):
+        time += move
+        solver = new_solver(walker, phase, state, move, tolerance)
+        while solver.status == "running":
+            solver.step()
+        state = solver.y
+        value = event(state)
+        move = float(-TINY * value / (event(state + TINY * walker.rates(phase, state)) - value))
+    return time, state
+
+
+# ---- walkers of configs, and their mistakes --------------------------------------------------------------------------
+
+
 def why_not_plain(config: RigidConfig) -> str:
     """Explain why the plain model does not describe a config's walker, or return '' if it does."""
     if describe_second_leg(config.walker):
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
-    return ""
+    return "" if config.walker.hip.hinge_law == LINEAR else "the plain model has no hinge laws of extensions"
 
 
 def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:

@@ -60,8 +60,9 @@ def section(_results: Any, summary: Row) -> Section | None:
 
 
 def source_of(source: Row) -> str:
-    parts = [str(source[key]) for key in ("authors", "title", "year", "where") if source.get(key)]
-    return f"Source: {', '.join(parts)}." if parts else ""
+    year = f" ({source['year']})" if source.get("year") else ""
+    parts = [source.get("authors"), f"{source.get('title') or ''}{year}".strip(), source.get("where")]
+    return f"Source: {', '.join(filter(None, parts))}." if any(parts) else ""
 
 
 def headline(summary: Row) -> str:

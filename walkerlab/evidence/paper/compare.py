@@ -1,42 +1,253 @@
 """Stage `compare`: compare both models with each other and, for the paper's walker, with every number in the paper."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from walkerlab.config.reads import CompareConfig
-from walkerlab.evidence.paper.compared_releases import LOCK_OMISSION, compare_releases
-from walkerlab.evidence.paper.departures import departures
-from walkerlab.evidence.paper.differences import (
-    STEPS_PER_STRIDE,
-    Comparison,
-    compare_motion,
-    motion_of,
-    stored_variable,
-)
-from walkerlab.evidence.paper.errata import Erratum, errata
+from walkerlab.config.reads import CompareConfig, ContactConfig
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import (
     EQUATION_SETS,
     PAPER_CYCLES,
+    Characteristics,
     ContactMeasurements,
+    EnergyRecord,
+    Errors,
     Measured,
     RigidMeasurements,
+    characteristics,
+    departures,
+    mean_over_last_steps,
     measure_rigid_model,
 )
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
-from walkerlab.evidence.paper.recorded import characteristics_of, compare_recorded, stored_energy
 from walkerlab.evidence.paper.rows import VERDICTS, count_verdicts, paper_rows, table_1, table_2, table_3
-from walkerlab.evidence.paper.study import study_the_paper
+from walkerlab.evidence.paper.study import Erratum, errata, study_the_paper
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
-from walkerlab.physics.hybrid.recorded_walk import as_state
+from walkerlab.physics.ground.walker import changed_forms
+from walkerlab.physics.hybrid import comparison
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel
+from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
+from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import last_step, mean_step
+from walkerlab.pipeline.stages.walk import (
+    LEG,
+    STEP,
+    TIME,
+    last_step,
+    leg_labels,
+    mean_step,
+    summarise_walk,
+    variables_over_time,
+)
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
-from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
-from walkerlab.scene.rigid import have_different_legs
+from walkerlab.scene.contact import GAIT_TOLERANCES, ContactScene, contact_scene, require_contact, start_state
+from walkerlab.scene.omissions import omission
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import add_drives, have_different_legs
+
+STEPS_PER_STRIDE = 2
+ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")
+QUANTITY_KEYS: dict[str, comparison.Quantity] = {"max_angle_error_rad": "angle", "max_velocity_error_rad_s": "velocity"}
+PHASE = "phase"
+
+
+def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | None:
+    variables = walk.groups.get(group, Group({}))
+    return variables[name] if name in variables.variables else None
+
+
+def times_of_steps(walk: Content, name: str) -> comparison.Array:
+    """Return the times (s) of a walk's steps, or nothing if they were not stored."""
+    times = stored_variable(walk, "steps", name)
+    return np.zeros(0) if times is None else times
+
+
+def motion_of(walk: Content) -> comparison.Motion | None:
+    """Return the motion of the legs in a stored walk, or None if states were not stored or the walk ended
+    immediately.
+    """
+    angle = stored_variable(walk, "trajectory", "angle")
+    if angle is None or len(angle) < 2:
+        return None
+    trajectory = walk["trajectory"]
+    strikes = times_of_steps(walk, "knee_strike_time_s")
+    touches = times_of_steps(walk, "touch_time_s")
+    # Where a knee does not lock, the time is NaN, which is not above 0.
+    motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
+    return comparison.add_strike_samples(motion)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Difference between the walks of both models."""
+
+    errors: Errors  # differences by alignment; alignments that cannot be compared are absent
+    orbit: list[float] | None = None  # distance between the orbits of each leg; None if no stride was completed
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Largest errors of both legs by alignment, or None for an alignment without a comparison."""
+        errors: dict[str, Any] = {}
+        for name, quantity in QUANTITY_KEYS.items():
+            per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
+            errors[name] = {way: max(both) if both else None for way, both in per_leg.items()} | {"per_leg": per_leg}
+        orbit = None if self.orbit is None else max(self.orbit)
+        return {**errors, "orbit_distance": orbit, "orbit_distance_per_leg": self.orbit}
+
+
+def compare_motion(
+    rigid: comparison.Motion | None, contact: comparison.Motion | None, meaning: str = "contact less rigid model"
+) -> Comparison:
+    """Compare two walks in time, in phase and as orbits, second minus first. `meaning` describes the difference."""
+    if rigid is None or contact is None:
+        why = "states of both walks are not available: outputs omits them, or a walk ended immediately"
+        return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
+    steps = min(rigid.steps, contact.steps)
+    orbit = None
+    time, raw = comparison.difference_in_time(contact, rigid)
+    errors = {"raw": raw}
+    in_time = differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time")
+    groups = {"errors": Group({**variables_over_time(time=time), **leg_labels(), **in_time})}
+    missing = ("differences in phase and between the orbits", "step")
+    if steps:
+        missing = ("differences of the last stride and between the orbits", "stride")
+        phases = np.linspace(0.0, 1.0, comparison.PHASES)
+        aligned = comparison.difference_in_phase(contact, rigid, phases)
+        smooth = comparison.smooth_phases(contact, rigid, phases)
+        errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
+        coordinates = {
+            **numbered(len(aligned.angle), STEP, "step number"),
+            PHASE: Variable(phases, (PHASE,), "1", "time within the step as a fraction of its period"),
+            **leg_labels(),
+        }
+        in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), f"{meaning}, at the same phase")
+        groups["aligned"] = Group({**coordinates, **in_phase}, {"impact_phase": comparison.IMPACT_PHASE})
+        if steps >= STEPS_PER_STRIDE:
+            last = slice(-STEPS_PER_STRIDE, None)
+            errors["settled"] = select(select(aligned, last), smooth[last])
+            text = "Hausdorff distance of the last stride's orbits, angle and velocity in units of the rigid orbit's "
+            distances = Variable(comparison.orbit_distances(contact, rigid), (LEG,), "1", f"{text}ranges")
+            groups["orbit"] = Group({**leg_labels(), "orbit_distance": distances})
+            orbit = distances.values.tolist()
+    what, needed = missing
+    lacking = {"what": what, "why": f"no {needed} was completed by both models"}
+    return Comparison(errors, orbit, groups, () if steps >= STEPS_PER_STRIDE else (lacking,))
+
+
+def select(difference: comparison.WalkDifference, where: Any) -> comparison.WalkDifference:
+    return comparison.WalkDifference(difference.angle[where], difference.velocity[where])
+
+
+def differences(
+    way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], meaning: str
+) -> dict[str, Variable]:
+    """Return differences of angles and velocities as variables to store. `way` is their alignment."""
+    return {
+        f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
+        f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),
+    }
+
+
+MODELS = {"rigid": "simulate", "contact": "contact-sim"}
+
+
+def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
+    """Return groups and summary of the recorded walk's differences from each model, or () if no walk was recorded."""
+    recorded = inputs.get("recorded-walk")
+    if recorded is None:
+        return {}, {}
+    motion = motion_of(recorded)
+    compared: dict[str, Comparison] = {
+        model: compare_motion(motion_of(inputs[stage]), motion, f"recorded walk less {model} model")
+        for model, stage in MODELS.items()
+    }
+    groups = {
+        f"recorded/{model}/{name}": group for model, each in compared.items() for name, group in each.groups.items()
+    }
+    walks = {**{model: inputs[stage] for model, stage in MODELS.items()}, "recorded": recorded}
+    summary = {
+        "name": recorded.summary["name"],
+        "doubts": recorded.summary["doubts"],
+        "steps": {model: last_step(walk.summary) for model, walk in walks.items()},
+        "table3": {model: asdict(characteristics_of(walk)) for model, walk in walks.items()},
+        "differences": {model: each.summary for model, each in compared.items()},
+    }
+    return groups, {"recorded": summary}
+
+
+def characteristics_of(walk: Content) -> Characteristics:
+    """Return the quantities of Table 3 for a stored walk. The mean energy is None if energies were not stored."""
+    periods, lengths = (np.array(walk.summary[key]) for key in ("step_periods_s", "step_lengths_m"))
+    energy = stored_energy(walk)
+    return characteristics(periods, lengths, None if energy is None else energy.mean)
+
+
+def stored_energy(walk: Content) -> EnergyRecord | None:
+    """Return the energy of a stored walk over its last steps, or None if energies were not stored."""
+    joules = stored_variable(walk, "trajectory", "mechanical_J")
+    if joules is None:
+        return None
+    return mean_over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))
+
+
+RELEASES = {"compression": False, "touch": True}
+"""Values of the config's `release`, and whether each releases the knee at the leading foot's first touch."""
+CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
+RIGID_STEPS = 200
+RIGID_TOLERANCES = Tolerances("dop853", 1e-8, 1e-10, 2_000_000)
+CONTACT_TOLERANCES = Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
+LOCK_OMISSION = omission(
+    "ideal against compliant lock",
+    "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
+    "compiling the contact walk a second time",
+)
+
+
+def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
+    """Simulate up to 20 steps from a gait with each moment of the trailing knee's release.
+
+    Each walk is compared with the corresponding rigid model, in which a knee released during compression is rigid in
+    the impact, and a knee released at first touch is free.
+
+    Returns None for walkers without knees, with a push-off or with legs that differ.
+    """
+    scene = contact_scene(config, pitch_m, pitch_m)
+    if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0 or have_different_legs(config):
+        return None
+    releases = {}
+    for name, at_touch in RELEASES.items():
+        released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
+        walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
+        parts = assembly_of(config.walker, rigid=True)
+        model = rigid_on_slope(parts, config.gravity_m_s2, config.slope_rad, not at_touch)
+        rigid = take_walk(add_drives(model, config), RIGID_TOLERANCES, state, RIGID_STEPS)
+        last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
+        of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
+        releases[name] = {**walk_report(scene, walk), "rigid": of_rigid}
+    return releases
+
+
+def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
+    """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
+    steps = walk.steps
+    lost = losses_by_channel(scene.walker, walk.dissipated_J)
+    return {
+        "outcome": walk.outcome.label,
+        "steps": steps,
+        "of": CONTACT_STEPS,
+        "knee_strike_s": None,
+        **last_step(summarise_walk(walk)),
+        "dissipated_J_per_step": {name: joules / steps for name, joules in lost.items()} if steps else None,
+    }
+
 
 START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
 PAPER_OMISSION = {
@@ -89,10 +300,8 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
         row["recorded"] = recorded["recorded"]["table3"]["recorded"][symbol]
-    omissions = [*summary.pop("left_out"), *motion.left_out]
-    return Content(
-        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": omissions}
-    )
+    summary |= shared | recorded | {"left_out": [*summary.pop("left_out"), *motion.left_out]}
+    return Content({**groups, **motion.groups, **recorded_groups}, summary)
 
 
 def compare_with_paper(

@@ -39,25 +39,19 @@ def draw_differences(results: Results) -> Drawn:
     raw, aligned = (results[walks.COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed = bool(walks.claims_in(results))
     early = raw["time"] <= rigid.time[-1]
-    recorded = results[walks.COMPARE_STAGE].groups.get("recorded/rigid/aligned")
-    summary = {}
-    recorded_look = RECORDED
-    if recorded is not None:
-        summary = results[walks.COMPARE_STAGE].summary["recorded"]
-        recorded_look = replace(RECORDED, label=f"{summary['name']}, at the same phase")
+    in_phase = [(aligned, PHASE_LOOK)]
+    summary = results[walks.COMPARE_STAGE].summary.get("recorded", {})
+    if (recorded := results[walks.COMPARE_STAGE].groups.get("recorded/rigid/aligned")) is not None:
+        in_phase.append((recorded, replace(RECORDED, label=f"{summary['name']}, at the same phase")))
     figure, axes = walks.time_axes(4, 1.55, [rigid])
     rows = [(*quantity, leg) for quantity in LEG_QUANTITIES for leg in (0, 1)]
     for panel, (letter, words, name, leg) in zip(axes, rows, strict=True):
-        raw_error = np.abs(raw[f"raw_{name}"][early, leg])
-        aligned_error = np.abs(aligned[f"aligned_{name}"][: rigid.strikes.size, :, leg])
-        walks.line(panel, raw["time"][early], raw_error, TIME_LOOK)
-        for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, aligned_error, strict=False):
-            walks.line(panel, begin + (end - begin) * aligned["phase"], error, PHASE_LOOK)
-        errors = [raw_error, aligned_error]
-        if recorded is not None:
-            errors.append(np.abs(recorded[f"aligned_{name}"][: rigid.strikes.size, :, leg]))
+        errors = [np.abs(raw[f"raw_{name}"][early, leg])]
+        walks.line(panel, raw["time"][early], errors[0], TIME_LOOK)
+        for group, look in in_phase:
+            errors.append(np.abs(group[f"aligned_{name}"][: rigid.strikes.size, :, leg]))
             for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, errors[-1], strict=False):
-                walks.line(panel, begin + (end - begin) * recorded["phase"], error, recorded_look)
+                walks.line(panel, begin + (end - begin) * group["phase"], error, look)
         largest = max(float(error.max()) for error in errors)
         bottom = ZERO_CROSSING * largest
         top = AXIS_MARGIN * largest
@@ -69,7 +63,7 @@ def draw_differences(results: Results) -> Drawn:
         panel.yaxis.set_major_formatter(power_of_ten)
         panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
         panel.set_title(f"({letter}{leg + 1}) {words} of leg {leg + 1}")
-    looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else []), *([] if recorded is None else [recorded_look])]
+    looks = [TIME_LOOK, PHASE_LOOK, *([PAPER_ERROR] if claimed else []), *(look for _, look in in_phase[1:])]
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), walks.strike_entry(rigid.look)])
     caption_values = []
     for _, words, name in LEG_QUANTITIES:

@@ -1,17 +1,32 @@
-"""Measurements to compare with the printed numbers: both sets of rigid equations, and the contact model."""
+"""Measurements to compare with the printed numbers: both sets of rigid equations, and the contact model.
 
-from collections.abc import Mapping
+If a config's scene departs from the paper's, its numbers neither confirm nor refute the paper's.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from walkerlab.config.contact import Contact
-from walkerlab.config.schema import Equations
+from walkerlab.config.contact import BOUNDS_SI, Contact
+from walkerlab.config.drives import acting_on
+from walkerlab.config.fields import are_equal
+from walkerlab.config.reads import CompareConfig
+from walkerlab.config.schema import Config, Equations
+from walkerlab.config.walkers import CompassWalker
 from walkerlab.evidence.paper.appendix_a import RigidWalker, assembled, step_length
+from walkerlab.evidence.paper.printed import X_P, adams_start_as_printed, slope_of
+from walkerlab.evidence.paper.prose import prose
+from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.comparison import Array, WalkDifference
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, sample_energies, sample_feet
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.hybrid.rigid_measures import energies
+from walkerlab.physics.hybrid.rigid_measures import energies, reactions
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 
@@ -151,3 +166,151 @@ class Measured:
     contact: ContactMeasurements
     errors: Errors
     departures: Departures
+
+
+CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
+SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
+"""Keys of the contact block whose values depend on the block's units."""
+UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
+"""Remaining keys of the contact block. `stance` is left out, because the paper also pins the first stance foot."""
+
+
+def departures(config: CompareConfig, start_moved: bool) -> Departures:
+    """Describe the differences from the paper's scene. Slopes that agree within the rounding of x_p count as equal."""
+    walker = config.walker
+    contact = config.contact
+    paper = CompassWalker()
+    rigid: list[str] = []
+    of_contact: list[str] = []
+    if acting := acting_on(config):
+        rigid.append(f"the walker has {' and '.join(acting)}")
+    if not config.ground.even:
+        rigid.append("the ground is uneven")
+    if not isinstance(walker, CompassWalker):
+        rigid.append(describe("walker.type", walker.type, paper.type))
+    else:
+        compass = [name for name in CompassWalker.model_fields if name not in (*CONTACT_MODEL_KEYS, "hip")]
+        rigid += [
+            *describe_differences(walker, paper, compass),
+            *describe_differences(config, Config(), ["gravity_m_s2"]),
+        ]
+        slope, rounding = slope_of(*X_P[:2])
+        if abs(config.slope_rad - slope) > rounding:
+            rigid.append(describe("slope_rad", config.slope_rad, slope))
+        if contact is not None:
+            of_contact += describe_differences(walker, paper, CONTACT_MODEL_KEYS)
+            of_contact += describe_differences(contact.to_si(), Contact().to_si(), SI_KEYS, "contact.{} (SI)")
+            of_contact += describe_differences(contact, Contact(), UNITLESS_KEYS, "contact.{}")
+    if start_moved:
+        of_contact.append("the start is not the rigid model's fixed point")
+    return Departures(tuple(rigid), (*rigid, *of_contact))
+
+
+def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
+    for name in names:
+        if not are_equal(getattr(used, name), getattr(paper, name)):
+            yield describe(called.format(name), getattr(used, name), getattr(paper, name))
+
+
+def describe(name: str, *values: Any) -> str:
+    used, paper = (f"{value:.6g}" if isinstance(value, float) else str(value) for value in values)
+    return f"{name} {used} instead of {paper}"
+
+
+FALLING = 4  # number of last samples in the cubic fit of a falling hip's height
+
+
+@dataclass(frozen=True)
+class AdamsStart:
+    """Walk of the rigid model from the ADAMS start."""
+
+    state: State  # rad and rad/s
+    slope: float  # rad
+    energy: float  # J, kinetic plus potential energy, with heights measured from the stance foot
+    weight: float  # N
+    normal_force: float  # N, normal force of the ground at the start
+    pull_from: float | None  # s, time from which the ground would have to pull; None if never
+    heel_strikes: int  # number of heel strikes in the walk
+    end: str  # outcome of the walk
+    end_time: float  # s
+
+
+@dataclass(frozen=True)
+class AdamsWalk:
+    """Walk of the contact model from the ADAMS start."""
+
+    terrain: str  # terrain of the contact model
+    rigid: AdamsStart  # walk of the rigid model from the same start, both feet on the config's slope
+    walk: ContactWalkResult
+    airborne_from: float | None  # s, first time at which no foot of the contact model touches the ground; None if never
+    # N, largest normal force of the contact model after the rigid model's ground would have to pull
+    later_normal_force: float | None
+    normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model
+    mechanical: NDArray[np.float64]  # (samples,) J, kinetic and potential energy of the contact model
+
+    @property
+    def reason(self) -> str:
+        return prose("adams_start.reason", self, int(self.walk.touch_time_s.size))
+
+
+def adams_start(walker: RigidModel, state: State) -> AdamsStart:
+    """Simulate one step of the rigid model from `state`, the ADAMS start of Table 2."""
+    walk = take_walk(walker, TIGHT, state, 1, sampled=True)
+    assert walk.samples is not None
+    time = walk.samples.time_s
+    states = walk.samples.state
+    start = np.array([state])
+    end = float(time[-1])
+    if walk.outcome is Outcome.FELL:  # the fall comes after the last sample, so extrapolate
+        hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
+        end = float(np.polynomial.Polynomial.fit(hip, time[-FALLING:], FALLING - 1)(0.0))
+    return AdamsStart(
+        state=state,
+        slope=walker.slope,
+        energy=float(energies(walker, start).sum()),
+        weight=float(walker.mass * walker.gravity),
+        normal_force=float(reactions(walker, start)[0, 1]),
+        pull_from=first_below_zero(time, reactions(walker, states)[:, 1]),
+        heel_strikes=walk.steps,
+        end=walk.outcome.label,
+        end_time=end,
+    )
+
+
+def adams_walk(
+    walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
+) -> AdamsWalk:
+    """Simulate the contact model from the ADAMS start of Table 2: its stance angle and velocities, on the walker's
+    slope.
+
+    walk     function that simulates the contact model from a rigid start state, with samples
+    terrain  terrain of the contact model, as named in the config
+    """
+    _, theta_2, omega_1, omega_2 = adams_start_as_printed()
+    rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
+    result = walk(rigid.state)
+    assert result.samples is not None
+    time = result.samples.time_s
+    normal = sample_feet(contact, result.samples)[:, :, 2]
+    total = normal.sum(axis=1)
+    airborne = time[(total <= 0.0) & (time > 0.0)]
+    later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]
+    return AdamsWalk(
+        terrain=terrain,
+        rigid=rigid,
+        walk=result,
+        airborne_from=float(airborne[0]) if airborne.size else None,
+        later_normal_force=float(later.max()) if later.size else None,
+        normal=normal,
+        mechanical=sample_energies(contact, result.samples)[:, :2].sum(axis=1),
+    )
+
+
+def first_below_zero(time: Array, values: Array) -> float | None:
+    """Return the interpolated time (s) at which sampled values first cross zero downwards, or None if they do not."""
+    below = np.flatnonzero(values < 0.0)
+    if below.size == 0:
+        return None
+    # The order is reversed, because `np.interp` needs rising values.
+    around = [int(below[0]), max(int(below[0]) - 1, 0)]
+    return float(np.interp(0.0, values[around], time[around]))

@@ -9,9 +9,8 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.check.printed import Judged, Verdict
 from walkerlab.evidence.paper import printed
-from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
 from walkerlab.evidence.paper.measured import EQUATION_SETS, PAPER_CYCLES, Measured
-from walkerlab.evidence.paper.printed import Printed, speed_difference
+from walkerlab.evidence.paper.printed import Printed, contradictions, percent_left_open, speed_difference
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.evidence.paper.study import PaperStudy
 from walkerlab.physics.hybrid.comparison import Quantity
@@ -132,7 +131,7 @@ class Judge:
         return self.row(entry, radii, None, verdict, "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> Judged:
-        """Judge the loss of balance from MATLAB's initial conditions."""
+        """Judge the paper's claim that the walker loses its balance from MATLAB's initial conditions."""
         steps, outcome = self.measured.contact.from_x_p
         right = None if self.measured.departures.rigid else self.measured.models.get("corrected")
         short = None if right is None else 100.0 * (1.0 - printed.X_P[3].value / right.state[3])
@@ -223,9 +222,8 @@ class Judge:
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
-        verdict = verdict_on(
-            row.matlab, rigid.values(), Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
-        )
+        otherwise = Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
+        verdict = verdict_on(row.matlab, rigid.values(), otherwise)
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
         yield self.row(row.matlab, rigid, contact, verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)
@@ -290,7 +288,7 @@ def table_3(measured: Measured) -> Table:
 
 
 def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
-    """Return the columns of both printed numbers, of the rigid model by set of equations, and of the contact model."""
+    """Return the columns: both printed numbers, the rigid model's for each set of equations, the contact model's."""
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,

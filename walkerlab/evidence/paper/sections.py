@@ -26,9 +26,7 @@ def numbers(results: page.Results) -> page.Section | None:
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
-    statements = tuple(
-        page.Statement(f"{spell_verdict(name).capitalize()}:", meaning, tone=TONES[name]) for name, meaning in meanings
-    )
+    statements = tuple(verdict_statement(name, meaning) for name, meaning in meanings)
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (page.Paragraph(departs, "fair"), page.Statements(statements, "lines"), numbers_table(rows))
     return page.Section.create("paper-numbers", "The paper’s numbers", blocks, finding(rows), page.PAPER_PAGE)
@@ -56,6 +54,10 @@ def finding(rows: Sequence[Row]) -> str:
 
 def spell_verdict(verdict: str) -> str:
     return verdict.replace("-", " ")
+
+
+def verdict_statement(name: str, text: str) -> page.Statement:
+    return page.Statement(f"{spell_verdict(name).capitalize()}:", text, tone=TONES[name])
 
 
 def name_with_unit(name: str, unit: str | None) -> str:
@@ -96,12 +98,8 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
         source = key if texts or not as_text else f"{key}{TEXT_SUFFIX}"
         columns.append(Column(heads.get(key, key.replace("_", " ")), source, written, numeric=not texts))
     names = {symbol: f"{name}, {symbol}" for symbol, name in words.terms("paper.quantities").items()}
-    return table(
-        caption,
-        columns,
-        [{"row": name_with_unit(names.get(symbol, symbol), row.get("unit")), **row} for symbol, row in rows.items()],
-        note=note,
-    )
+    named = [{"row": name_with_unit(names.get(symbol, symbol), row.get("unit")), **row} for symbol, row in rows.items()]
+    return table(caption, columns, named, note=note)
 
 
 ERRATUM_COLUMNS = (
@@ -132,13 +130,8 @@ def list_verdicts(results: page.Results, rows: Sequence[Row]) -> Iterator[page.P
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield page.Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
     totals = Counter(row["where"] for row in rows)
-    statements = (
-        page.Statement(
-            f"{spell_verdict(name).capitalize()}:", words("verdict.places", counts, totals), tone=TONES[name]
-        )
-        for name, counts in places.items()
-        if counts
-    )
+    texts = {name: words("verdict.places", counts, totals) for name, counts in places.items() if counts}
+    statements = (verdict_statement(name, text) for name, text in texts.items())
     yield page.Statements(tuple(statements), "lines")
     headlines = words.terms("verdict.headlines").items()
     gravest = [
@@ -193,18 +186,15 @@ def recorded_tables(stored: Row) -> Iterator[Table]:
     yield table(f"Quantities of Table 3 with {stored['name']}", columns, rows)
     keys = {"max_angle_error_rad": ("angle", "rad"), "max_velocity_error_rad_s": ("angular velocity", "rad/s")}
     ways = {"raw": "at the same time", "aligned": "at the same phase"}
-    yield table(
-        f"Differences of {stored['name']} from both models",
-        RECORDED_COLUMNS,
-        [
-            {
-                "quantity": name_with_unit(f"{name} {words_of_way}", unit),
-                **{model: each[key][way] for model, each in stored["differences"].items()},
-            }
-            for key, (name, unit) in keys.items()
-            for way, words_of_way in ways.items()
-        ],
-    )
+    differences = [
+        {
+            "quantity": name_with_unit(f"{name} {words_of_way}", unit),
+            **{model: each[key][way] for model, each in stored["differences"].items()},
+        }
+        for key, (name, unit) in keys.items()
+        for way, words_of_way in ways.items()
+    ]
+    yield table(f"Differences of {stored['name']} from both models", RECORDED_COLUMNS, differences)
 
 
 def answer(summary: Row) -> list[str | Table]:

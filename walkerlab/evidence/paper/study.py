@@ -1,16 +1,111 @@
-"""Measurements on the paper's own walker and slope, for its errata. They do not depend on the config."""
+"""Measurements on the paper's own walker and slope, and the errata that they support. They do not depend on the config.
+
+Some measurements follow Appendix A's misprints. Their heel strike solves the six equations of (A.57) as printed.
+"""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
+from scipy.optimize import root
 
-from walkerlab.evidence.paper import measured, misprints, printed
-from walkerlab.evidence.paper.adams_start import AdamsStart, adams_start
-from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
+from walkerlab.evidence.paper import measured, printed
+from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled, swing_constants
+from walkerlab.evidence.paper.measured import AdamsStart, adams_start
+from walkerlab.evidence.paper.prose import prose
+from walkerlab.labels import Label
+from walkerlab.physics.hybrid.comparison import Array
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.solvers.system import State
+
+RIGHT, MISPRINTED = 1.0, -1.0  # sign of the second row of P and E
+ROOT_TOLERANCE = 1e-9
+
+
+def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Array:
+    """Mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
+    c = swing_constants(walker)
+    coupling = -c.mLb * math.cos(theta_2 - theta_1)
+    s1 = math.sin(theta_1)
+    c1 = math.cos(theta_1)
+    s2 = math.sin(theta_2)
+    c2 = math.cos(theta_2)
+    return np.array(
+        [
+            [c.d11, coupling, c.mb * c1, c.mb * s1],
+            [coupling, c.d22, -c2 * c.K, -s2 * c.K],
+            [c.mb * c1, -c2 * c.K, c.mass, 0.0],
+            [c.mb * s1, -s2 * c.K, 0.0, c.mass],
+        ]
+    )
+
+
+def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
+    """Position P (m) of the swing foot, (A.55), with the stance foot at the origin. `row_2` is RIGHT or MISPRINTED."""
+    L = walker.leg_length
+    rise = L * (math.cos(theta_2) - math.cos(theta_1))
+    return np.array([L * (math.sin(theta_1) - math.sin(theta_2)), row_2 * rise])
+
+
+def height_over_slope(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> float:
+    """Height (m) above the slope at which P places the swing foot."""
+    along, up = swing_foot(walker, theta_1, theta_2, row_2)
+    return float(along * math.sin(walker.slope) + up * math.cos(walker.slope))
+
+
+def swing_foot_gradient(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
+    """Matrix E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
+    L = walker.leg_length
+    return np.array(
+        [
+            [L * math.cos(theta_1), -L * math.cos(theta_2), 1.0, 0.0],
+            [row_2 * L * math.sin(theta_1), -row_2 * L * math.sin(theta_2), 0.0, 1.0],
+        ]
+    )
+
+
+def velocities_after_impact(walker: RigidWalker, before: State, row_2: float) -> Array:
+    """Solve (A.57): velocities of (theta_1, theta_2, x, y) after the impact, before the change of roles."""
+    D = inertia_at_impact(walker, before[0], before[1])
+    E = swing_foot_gradient(walker, before[0], before[1], row_2)
+    system = np.block([[D, -E.T], [E, np.zeros((2, 2))]])
+    velocities = np.array([before[2], before[3], 0.0, 0.0])
+    return np.asarray(np.linalg.solve(system, np.concatenate((D @ velocities, np.zeros(2))))[:4])
+
+
+def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float) -> float:
+    """Speed (m/s) of the new stance foot after the impact, which (7) requires to be zero."""
+    after = velocities_after_impact(walker, before, row_2)
+    return float(np.linalg.norm(swing_foot_gradient(walker, before[0], before[1], RIGHT) @ after))
+
+
+def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
+    """Return the state after one step with the impact of (A.57), or None if no heel strike occurs."""
+    walk = take_walk(assembled(walker), measured.TIGHT, start, 1)
+    if walk.steps == 0:
+        return None
+    before = as_state(walk.before[0])
+    after = velocities_after_impact(walker, before, row_2)
+    return before[1], before[0], float(after[1]), float(after[0])
+
+
+def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None:
+    """Find the fixed point, near `guess`, of the step map with the impact of (A.57), or return None if the search
+    fails.
+    """
+
+    def state(z: Array) -> State:
+        return -2.0 * walker.slope - float(z[0]), float(z[0]), float(z[1]), float(z[2])
+
+    def mismatch(z: Array) -> Array:
+        after = step(walker, state(z), row_2)
+        return np.full(3, 1.0) if after is None else np.array(after[1:]) - z
+
+    solution = root(mismatch, np.array(guess[1:]), tol=ROOT_TOLERANCE)
+    return state(solution.x) if np.abs(mismatch(solution.x)).max() < 1e3 * ROOT_TOLERANCE else None
+
 
 X_P_SETTLING_STEPS = 150  # steps from x_p to the fixed point; disturbances shrink by a factor of 0.6 per step
 FOOT_VELOCITY = (0.3, -0.2)  # m/s, velocity of the foot in the check of (A.9) to (A.24)
@@ -60,9 +155,9 @@ def study_the_paper() -> PaperStudy:
         five_steps_energy=five_steps.mean_energy,
         fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
-        swing_foot_height=misprints.height_over_slope(wrong, *x_p[:2], misprints.MISPRINTED),
-        foothold_speed=misprints.foothold_speed_after_impact(wrong, as_state(one_step.before[0]), misprints.MISPRINTED),
-        both_misprints=misprints.fixed_point(wrong, as_printed, misprints.MISPRINTED),
+        swing_foot_height=height_over_slope(wrong, *x_p[:2], MISPRINTED),
+        foothold_speed=foothold_speed_after_impact(wrong, as_state(one_step.before[0]), MISPRINTED),
+        both_misprints=fixed_point(wrong, as_printed, MISPRINTED),
         kinetic_energy=kinetic_energy_by_order(right),
         adams=adams_start(assembled(right._replace(slope=adams_slope)), printed.adams_start_as_printed()),
     )
@@ -79,7 +174,7 @@ def settle(walker: RigidWalker) -> State:
 def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
     """Return the kinetic energy (J) at x_p with a moving foot: from masses, and from D_e with angles or foot first."""
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
-    D = misprints.inertia_at_impact(walker, theta_1, theta_2)
+    D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
     foot_first = np.array([*FOOT_VELOCITY, omega_1, omega_2])
     L, a = walker.leg_length, walker.foot_to_mass
@@ -97,3 +192,21 @@ def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
         "angles_first": float(0.5 * angles_first @ D @ angles_first),
         "foot_first": float(0.5 * foot_first @ D @ foot_first),
     }
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """Error in the paper."""
+
+    where: Annotated[str, Label("", "location in the paper")]
+    printed: Annotated[str, Label("", "printed")]
+    right: Annotated[str, Label("", "correct")]
+    evidence: Annotated[str, Label("", "argument")]
+    measured: Annotated[str, Label("", "values from this run")]
+
+
+def errata(study: PaperStudy) -> tuple[Erratum, ...]:
+    """Return all errata, by theme and then in the order of the paper's sections."""
+    texts = [text.partition(": ")[2] for text in prose.parts("errata.errata", study)]
+    length = len(fields(Erratum))
+    return tuple(Erratum(*texts[first : first + length]) for first in range(0, len(texts), length))

@@ -37,9 +37,8 @@ CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_EN
 @cache
 def package_cases() -> tuple[Case, ...]:
     families = read_catalogue(CATALOGUE).items()
-    return check_unique_names(
-        [Case.model_validate({"family": name, **entry}) for name, cases in families for entry in cases]
-    )
+    cases = [Case.model_validate({"family": name, **entry}) for name, entries in families for entry in entries]
+    return check_unique_names(cases)
 
 
 def read_catalogue(path: Path) -> Any:

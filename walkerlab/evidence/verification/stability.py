@@ -7,8 +7,7 @@ from typing import Any, TypeGuard
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config, replace_state
 from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
-from walkerlab.evidence.verification.judge import CaseCell, run_cells
-from walkerlab.evidence.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, Choice
+from walkerlab.evidence.verification.judge import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, CaseCell, Choice, run_cells
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress, track
@@ -54,9 +53,8 @@ def run(
     problems = inputs["known-problems"]
     summary = summarise(cases, problems.summary["known"], [item for item in items if isinstance(item, Choice)])
     group = rows_group(cases, labels_of(CaseResult), "case", "number of the row")
-    return Content(
-        {"cases": group, "known": problems["known"]}, {**summary, "left_out": list(verification_omissions(config))}
-    )
+    summary["left_out"] = list(verification_omissions(config))
+    return Content({"cases": group, "known": problems["known"]}, summary)
 
 
 def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:

@@ -10,9 +10,8 @@ from walkerlab.config.analyses import Case
 from walkerlab.config.contact import Contact
 from walkerlab.config.reads import MapsConfig
 from walkerlab.config.schema import Config
-from walkerlab.evidence.verification import ordinary
+from walkerlab.evidence.verification import judge
 from walkerlab.evidence.verification.catalogue import config_of
-from walkerlab.evidence.verification.judge import TIGHTER_FACTOR
 from walkerlab.evidence.verification.starts import ContactStart, case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.outcome import Outcome
@@ -30,9 +29,10 @@ ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which 
 PER_STICTION: Final = 10.0  # friction velocity / stiction velocity, as in the paper
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-CELL_BUDGET = 600_000  # right-hand sides
+# right-hand sides per cell: for the walk, for its second walk at tighter tolerances, and for the reference, which
+# mostly needs about 7e6
+CELL_BUDGET = 600_000
 TIGHTER_CELL_BUDGET = 1_200_000
-# Most references need about 7e6.
 REFERENCE_CELL_BUDGET = 20_000_000
 MAX_FIXED_STEPS: Final = 5_000_000  # steps of semi-implicit Euler, more than any cell needs
 VERDICT_NAMES: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
@@ -66,10 +66,10 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     walk = again = start.walk(case, case_tolerances(start, case))
     if walk.outcome.answered:
         tighter = case.model_copy(update={"budget": TIGHTER_CELL_BUDGET})
-        again = start.walk(case, case_tolerances(start, tighter, TIGHTER_FACTOR))
+        again = start.walk(case, case_tolerances(start, tighter, judge.TIGHTER_FACTOR))
     error = ERROR_MISSING
     if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
-        ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / ordinary.natural_units(config)
+        ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / judge.natural_units(config)
         error = finite(float(np.max(np.concatenate([np.abs(walk.touches - again.touches), ends]))))
     numbers = walk.outcome, walk.touches.size, again.outcome, error, walk.rhs_evaluations
     return [float(number) for number in numbers]
@@ -81,14 +81,14 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
     Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error, in the units of `stiction_cell`.
     """
-    case, config, start = prepare_on_ground(stiffness, None, ordinary.COMPARED_STEPS, REFERENCE_CELL_BUDGET)
-    walk = start.walk(case, Tolerances(*ordinary.REFERENCE_SETTINGS, case.budget))
+    case, config, start = prepare_on_ground(stiffness, None, judge.COMPARED_STEPS, REFERENCE_CELL_BUDGET)
+    walk = start.walk(case, Tolerances(*judge.REFERENCE_SETTINGS, case.budget))
     if not walk.outcome.answered:
         return [float(VERDICT_NAMES.index("no reference")), ERROR_MISSING] * len(steps_s)
-    arrival = ordinary.arrival_of("map", walk.record, config)
+    arrival = judge.arrival_of("map", walk.record, config)
     numbers: Numbers = []
     for h in steps_s:
-        choice = ordinary.euler(arrival, start, h, MAX_FIXED_STEPS)
+        choice = judge.euler(arrival, start, h, MAX_FIXED_STEPS)
         numbers += [float(VERDICT_NAMES.index(choice.verdict)), ERROR_MISSING if choice.error is None else choice.error]
     return numbers
 
@@ -165,7 +165,7 @@ def step_group(cells: int, results: Mapping[str, Numbers]) -> Group:
         "error": Variable(np.where(errors == ERROR_MISSING, np.nan, errors), dims, "1", text, missing=True),
     }
     legend = ", ".join(f"{number} {verdict}" for number, verdict in enumerate(VERDICT_NAMES))
-    return Group(variables, {"verdicts": legend, "steps_wanted": ordinary.COMPARED_STEPS, "fine": ordinary.FINE_ERROR})
+    return Group(variables, {"verdicts": legend, "steps_wanted": judge.COMPARED_STEPS, "fine": judge.FINE_ERROR})
 
 
 def axis(name: str, ends: tuple[float, float], cells: int, unit: str, text: str) -> dict[str, Variable]:

@@ -48,11 +48,11 @@ class CaseResult:
     reason: str
     expected: tuple[str, ...]
     outcome: Annotated[str, Label("", "how it ended")]
-    steps: Annotated[int, Label("1", "steps walked")]
-    energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")]  # noqa: N815
-    rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")]
-    wall_s: float
-    findings: tuple[Measure, ...]  # measures taken
+    steps: Annotated[int, Label("1", "steps walked")] = 0
+    energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")] = 0.0  # noqa: N815
+    rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")] = 0
+    wall_s: float = 0.0
+    findings: tuple[Measure, ...] = ()  # measures taken
     remarks: tuple[str, ...] = ()  # descriptions of further faults
     second_method: str = ""  # second method, for comparison; empty if no other method had an answer
     second_tried: str = ""  # failed methods with their outcomes, or the reason why none was tried

@@ -1,7 +1,8 @@
 """Assembly of a walker on compliant ground from its parts."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,9 @@ from walkerlab.physics.ground.friction import FrictionLaw
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.normal_force import Impact, NormalLaw
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import FIRST_KNEE, FORM, MAX_BODIES, NO_FOOT, ContactWalker
-from walkerlab.physics.mechanics import parts
-from walkerlab.physics.mechanics.hinges import HIP_ROW
+from walkerlab.physics.ground.walker import FIRST_KNEE, FORM_SHAPES, MAX_BODIES, NO_FOOT, ContactWalker, GroundModel
+from walkerlab.physics.mechanics import parts, tree
+from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper
 from walkerlab.physics.solvers.system import Floats
 
 
@@ -25,6 +26,14 @@ class KneeRules:
 
     stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
     release_at_touch: bool = False  # release the trailing knee at the touch, not when the leading foot stops sinking in
+
+
+@dataclass(frozen=True)
+class ContactDrives:
+    """Torques at the hinges, and push-offs. By default there are none."""
+
+    law: type[SpringDamper] = SpringDamper
+    fields: Mapping[str, Any] = field(default_factory=dict)  # of every form, as in `tree.write_fields`
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,7 @@ def contact_walker(
     slope: float,
     knee_rules: KneeRules | None = None,
     pinned_foot: int = STANCE_FOOT,
+    drives: ContactDrives | None = None,
 ) -> ContactWalker:
     """Assemble a walker on compliant ground (gravity in m/s^2, slope in rad). Foot k and knee k belong to leg k.
 
@@ -49,9 +59,10 @@ def contact_walker(
     ValueError, with a message for the user, if the parts cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
+    drives = drives or ContactDrives()
     check_walkable(assembly)
     # All forms are assembled beforehand: a walk only picks another record when a knee locks or a foot is released.
-    forms = np.zeros((2, 4), FORM)
+    forms = np.zeros((2, 4), tree.record_type(GroundModel, FORM_SHAPES, drives.law))
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
     forms["has_knee"] = [k < len(assembly.knees) for k in range(2)]
@@ -63,6 +74,7 @@ def contact_walker(
     legs = parts.leg_bodies(assembly)
     # Merging bodies renumbers them, so the hip's two bodies are looked up in each form.
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
+    tree.write_fields(forms, drives.fields)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
 
 
@@ -78,19 +90,19 @@ def check_walkable(assembly: parts.Assembly) -> None:
 
 
 def about_centre(assembly: parts.Assembly) -> Root:
-    tree, feet = parts.tree_about_centre(assembly)
+    about, feet = parts.tree_about_centre(assembly)
     hip = parts.hip_levers(assembly, feet[0])
-    return Root(tree, {"places": 2, "pinned": NO_FOOT}, levers_by_axis(feet, hip))
+    return Root(about, {"places": 2, "pinned": NO_FOOT}, levers_by_axis(feet, hip))
 
 
 def about_foot(assembly: parts.Assembly, foot: int) -> Root:
     ball = assembly.feet[foot]
-    tree = parts.tree_about(assembly, parts.Anchor(ball.body, ball.centre_m))
+    about = parts.tree_about(assembly, parts.Anchor(ball.body, ball.centre_m))
     _, from_centre = parts.tree_about_centre(assembly)
     # The levers between two points are the difference of their levers from a third, here the centre of mass.
     feet = [d - from_centre[foot] for d in from_centre]
     hip = parts.hip_levers(assembly, from_centre[0]) - from_centre[foot]
-    return Root(tree, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
+    return Root(about, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
 
 
 def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:

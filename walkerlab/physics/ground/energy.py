@@ -2,34 +2,24 @@
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.normal_force import elastic_energy
 from walkerlab.physics.ground.pulse import push_on
-from walkerlab.physics.ground.walker import (
-    BODY_VECTOR,
-    GroundModel,
-    OnGround,
-    foot_force,
-    foot_motion,
-    half_size,
-    one_foot_motion,
-    relative_to_ground,
-    sines_cosines,
-)
+from walkerlab.physics.ground.walker import BODY_VECTOR, GroundModel, OnGround
 from walkerlab.physics.kernels import kernel_part, matrix, vector
 from walkerlab.physics.mechanics import tree
-from walkerlab.physics.mechanics.tree import add_inertia, projections
 
 
 @kernel_part
 def kinetic_energy(form: GroundModel, y: Any) -> float:
     # r is scratch here; only M is used
     s, c, r, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
-    half = half_size(form)
+    half = forms.half_size(form)
     total = 0.0
     omega = y[half + form.places : 2 * half]
-    sines_cosines(form, y, s, c)
-    add_inertia(form, form.bodies, s, c, omega, M, r)
+    forms.sines_cosines(form, y, s, c)
+    tree.add_inertia(form, form.bodies, s, c, omega, M, r)
     # About the centre of mass, the energies of translation and rotation add without a coupling term. A pinned form has
     # no translation.
     for i in range(form.places):
@@ -41,8 +31,8 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
 def potential_energy(form: GroundModel, y: Any) -> float:
     """Compute the potential energy of gravity (J), which is zero at the origin of the slope's frame."""
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
-    sines_cosines(form, y, s, c)
-    projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
+    forms.sines_cosines(form, y, s, c)
+    tree.projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
     if form.places > 0:
         return tree.potential_energy(form, form.bodies, y[0], y[1], F, U)
     return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)
@@ -50,7 +40,7 @@ def potential_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
-    motion = relative_to_ground(system, foot, one_foot_motion(system.form, foot, y))
+    motion = forms.relative_to_ground(system, foot, forms.one_foot_motion(system.form, foot, y))
     return elastic_energy(system.normal, -motion.height)
 
 
@@ -73,9 +63,9 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     s = vector(BODY_VECTOR)
     c = vector(BODY_VECTOR)
     foot = 1 - system.progress.stance
-    sines_cosines(system.form, y, s, c)
+    forms.sines_cosines(system.form, y, s, c)
     push = push_on(system, t, foot, s, c)
-    motion = foot_motion(system.form, foot, s, c, y)
+    motion = forms.foot_motion(system.form, foot, s, c, y)
     # The push acts on the foot's material, so its power takes the slip velocity, not the speed of the rolling contact
     # point.
     return push.along * motion.slip + push.upward * motion.vertical_velocity
@@ -84,10 +74,10 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
     """Compute the powers (W) that a foot loses to damping and to friction, and the normal force (N) on it."""
-    motion = relative_to_ground(system, foot, one_foot_motion(system.form, foot, y))
+    motion = forms.relative_to_ground(system, foot, forms.one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
-    force = foot_force(system, motion)
+    force = forms.foot_force(system, motion)
     # damping takes (F_n - k d^e) d', where d' is the rate of the penetration d
     damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
     return damping, -force.along * motion.slip, force.normal.force

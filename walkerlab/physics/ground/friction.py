@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, Protocol, Self
 import numpy as np
 
 from walkerlab.physics.ground.normal_force import smooth_step
-from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
+from walkerlab.physics.kernels import LawKind, dispatch_by_type, dispatch_by_type_or_default
 
 SLOPE_SAMPLES = 101  # slip velocities in each of the rising and the falling part
 
@@ -163,7 +163,13 @@ def no_coefficient(law: Frictionless, slip: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none": Frictionless}
+FRICTION_LAWS: Final = LawKind(
+    "friction",
+    {"coulomb": Coulomb, "none": Frictionless},
+    FrictionLaw,
+    (friction_coefficient,),
+    (switching_count, sample_switching),
+)
 """Friction laws by their names in `contact.friction` of a config."""
 
 

@@ -5,23 +5,13 @@ from typing import Any
 from walkerlab.physics.ground.knees import angle_between
 from walkerlab.physics.ground.walker import FIRST_KNEE, STOPPING, OnGround, half_size
 from walkerlab.physics.kernels import kernel_part
-from walkerlab.physics.mechanics.hinges import (
-    HIP_ROW,
-    HingeTorque,
-    add_hinge_gradients,
-    add_hinge_torque,
-    hinge_energy,
-    hinge_law,
-    hinge_torque,
-    is_sprung,
-    legs_apart,
-)
+from walkerlab.physics.mechanics import hinges
 
 
 @kernel_part
 def hip_sign(system: OnGround, row: int) -> float:
     """Return -1 for the hip while the first leg is the stance leg, otherwise 1."""
-    return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
+    return -1.0 if row == hinges.HIP_ROW and system.progress.stance == 0 else 1.0
 
 
 @kernel_part
@@ -41,14 +31,14 @@ def is_stopping(system: OnGround, row: int) -> bool:
 
 
 @kernel_part
-def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
+def torque_at(system: OnGround, row: int, y: Any) -> hinges.HingeTorque:
     """Compute the torque of spring, damper and drive at a hinge, plus the torque of a knee's stop while it acts."""
     angle, rate = angle_at(system, row, y)
-    law = hinge_torque(hinge_law(system.form, row), angle, rate)
+    law = hinges.hinge_torque(hinges.hinge_law(system.form, row), angle, rate)
     if not is_stopping(system, row):
         return law
-    stop = hinge_torque(system.stop, angle, rate)
-    return HingeTorque(
+    stop = hinges.hinge_torque(system.stop, angle, rate)
+    return hinges.HingeTorque(
         law.resistance + stop.resistance,
         law.elastic + stop.elastic,
         law.by_angle + stop.by_angle,
@@ -68,18 +58,18 @@ def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
 def add_torques(system: OnGround, y: Any, r: Any) -> None:
     """Add the torques (N m) at all hinges to r (n,)."""
     for row in range(len(system.form.hinges)):
-        if is_sprung(system.form, row) or is_stopping(system, row):
+        if hinges.is_sprung(system.form, row) or is_stopping(system, row):
             body, other = bodies_at(system, row)
-            add_hinge_torque(torque_at(system, row, y), body, other, r)
+            hinges.add_hinge_torque(torque_at(system, row, y), body, other, r)
 
 
 @kernel_part
 def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of all hinge torques with respect to angles and rates to by_angle and by_rate (n, n)."""
     for row in range(len(system.form.hinges)):
-        if is_sprung(system.form, row) or is_stopping(system, row):
+        if hinges.is_sprung(system.form, row) or is_stopping(system, row):
             body, other = bodies_at(system, row)
-            add_hinge_gradients(torque_at(system, row, y), body, other, by_angle, by_rate)
+            hinges.add_hinge_gradients(torque_at(system, row, y), body, other, by_angle, by_rate)
 
 
 @kernel_part
@@ -89,10 +79,10 @@ def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
     stops = 0.0
     for row in range(len(system.form.hinges)):
         angle, _ = angle_at(system, row, y)
-        if is_sprung(system.form, row):
-            springs += hinge_energy(hinge_law(system.form, row), angle)
+        if hinges.is_sprung(system.form, row):
+            springs += hinges.hinge_energy(hinges.hinge_law(system.form, row), angle)
         if is_stopping(system, row):
-            stops += hinge_energy(system.stop, angle)
+            stops += hinges.hinge_energy(system.stop, angle)
     return springs, stops
 
 
@@ -103,17 +93,17 @@ def hinge_powers(system: OnGround, y: Any) -> tuple[float, float]:
     lost = 0.0
     for row in range(len(system.form.hinges)):
         angle, rate = angle_at(system, row, y)
-        if is_sprung(system.form, row):
-            law = hinge_torque(hinge_law(system.form, row), angle, rate)
+        if hinges.is_sprung(system.form, row):
+            law = hinges.hinge_torque(hinges.hinge_law(system.form, row), angle, rate)
             # The spring's part is stored, not supplied: `hinge_energies` counts it.
             supplied += (law.elastic - law.resistance) * rate
         if is_stopping(system, row):
-            stop = hinge_torque(system.stop, angle, rate)
+            stop = hinges.hinge_torque(system.stop, angle, rate)
             lost += (stop.resistance - stop.elastic) * rate
     return supplied, lost
 
 
-@legs_apart.case(OnGround)
+@hinges.legs_apart.case(OnGround)
 def legs_apart_on_ground(system: OnGround, y: Any) -> tuple[float, float]:
     """Return the angle between the legs' uppermost bodies (rad), and its rate (rad/s)."""
-    return angle_at(system, HIP_ROW, y)
+    return angle_at(system, hinges.HIP_ROW, y)

@@ -2,28 +2,12 @@
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.hinges import add_gradients, add_torques
 from walkerlab.physics.ground.pulse import push_gradient, push_on
-from walkerlab.physics.ground.walker import (
-    BODY_VECTOR,
-    GroundModel,
-    OnGround,
-    foot_force,
-    foot_motion,
-    half_size,
-    relative_to_ground,
-    sines_cosines,
-)
+from walkerlab.physics.ground.walker import BODY_VECTOR, GroundModel, OnGround
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.tree import (
-    add_gravity,
-    add_gravity_gradient,
-    add_inertia,
-    add_inertia_gradients,
-    factor_linked,
-    projections,
-    solve_linked,
-)
+from walkerlab.physics.mechanics import tree
 from walkerlab.physics.solvers.system import block, derivative, jacobian
 
 
@@ -43,15 +27,15 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
     along = push.along
     normal = push.upward
     if system.has_ground[foot] != 0:
-        motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
+        motion = forms.relative_to_ground(system, foot, forms.foot_motion(form, foot, s, c, y))
         if motion.height < 0.0:
-            force = foot_force(system, motion)
+            force = forms.foot_force(system, motion)
             along += force.along
             normal += force.normal.force
     if along == 0.0 and normal == 0.0:
         return 0.0, 0.0
     F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    tree.projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
         # Virtual work: per unit rate of body k, the foot's lowest material point moves by rolling - U along the slope
         # and by F normal to it.
@@ -67,16 +51,16 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     """
     # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a pinned form, of gravity
     form = system.form
-    sines_cosines(form, y, s, c)
+    forms.sines_cosines(form, y, s, c)
     n = form.bodies
-    half = half_size(form)
+    half = forms.half_size(form)
     for k in range(n):
         r[k] = 0.0
     # About the centre of mass gravity has no torque; `ground_derivative` adds its acceleration.
     if form.places == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-        projections(form.arm_x, form.arm_y, n, s, c, F, U)
-        add_gravity(form, n, F, U, r)
+        tree.projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        tree.add_gravity(form, n, F, U, r)
     along = 0.0
     normal = 0.0
     for foot in range(2):
@@ -84,9 +68,9 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
         along += force[0]
         normal += force[1]
     add_torques(system, y, r)
-    add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
-    factor_linked(form.E[0], n, M)
-    solve_linked(form.E[0], n, M, r)
+    tree.add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
+    tree.factor_linked(form.E[0], n, M)
+    tree.solve_linked(form.E[0], n, M, r)
     return along, normal
 
 
@@ -95,7 +79,7 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     """Evaluate Newton's law for the centre of mass (unless a foot is pinned) and the tree's equations of motion."""
     form = system.form
     n = form.bodies
-    half = half_size(form)
+    half = forms.half_size(form)
     first = form.places
     s, c, r, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
     along, normal = solve_motion(system, t, y, s, c, M, r)
@@ -112,7 +96,7 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
     """Differentiate a foot's penetration, its rate and slip with respect to y[j]. F, U (n,) are projected levers."""
     p = form.places
-    half = half_size(form)
+    half = forms.half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
     if k < 0:
@@ -132,7 +116,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
     """Add the derivatives of a foot's force and torques to J. Its rows are divided by mass and inertia later."""
     form = system.form
     push = push_on(system, t, foot, s, c)
-    motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
+    motion = forms.relative_to_ground(system, foot, forms.foot_motion(form, foot, s, c, y))
     inside = system.has_ground[foot] != 0 and motion.height < 0.0
     pushed = push.above != 0.0
     if not inside and not pushed:
@@ -140,12 +124,12 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
     F = vector(BODY_VECTOR)
     U = vector(BODY_VECTOR)
     p = form.places
-    half = half_size(form)
-    projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
+    half = forms.half_size(form)
+    tree.projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     along = push.along
     normal = push.upward
     if inside:
-        force = foot_force(system, motion)
+        force = forms.foot_force(system, motion)
         along += force.along
         normal += force.normal.force
         for j in range(2 * half):
@@ -165,7 +149,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
 def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
     """Add derivatives of a foot's force (`along` and `normal` to the slope) and of its torques to column j of J."""
     p = form.places
-    half = half_size(form)
+    half = forms.half_size(form)
     if p > 0:
         J[half, j] += along
         J[half + 1, j] += normal
@@ -178,13 +162,13 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
     form = system.form
     n = form.bodies
     p = form.places
-    half = half_size(form)
+    half = forms.half_size(form)
     if p == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
-        projections(form.arm_x, form.arm_y, n, s, c, F, U)
-        add_gravity_gradient(form, n, F, U, by_angle)
+        tree.projections(form.arm_x, form.arm_y, n, s, c, F, U)
+        tree.add_gravity_gradient(form, n, F, U, by_angle)
     add_gradients(system, y, by_angle, by_rate)
-    add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
+    tree.add_inertia_gradients(form, n, s, c, y[half + p : 2 * half], alpha, by_angle, by_rate)
 
 
 @jacobian.case(OnGround)
@@ -193,7 +177,7 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     form = system.form
     n = form.bodies
     p = form.places
-    half = half_size(form)
+    half = forms.half_size(form)
     s = vector(BODY_VECTOR)
     c = vector(BODY_VECTOR)
     alpha = vector(BODY_VECTOR)
@@ -207,7 +191,7 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     for k in range(n):
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        solve_linked(form.E[0], n, M, by_torque[k])
+        tree.solve_linked(form.E[0], n, M, by_torque[k])
     for foot in range(2):
         add_foot_gradients(system, t, foot, s, c, y, J)
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])

@@ -10,7 +10,7 @@ import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
-from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default, kernel_part
+from walkerlab.physics.kernels import LawKind, dispatch_by_type, dispatch_by_type_or_default, kernel_part
 
 
 @kernel_part
@@ -144,5 +144,7 @@ def impact_switching_penetration(law: Impact) -> float:
     return law.full_damping_penetration
 
 
-NORMAL_LAWS: Final[dict[str, type[NormalLaw]]] = {"impact": Impact}
+NORMAL_LAWS: Final = LawKind(
+    "normal_force", {"impact": Impact}, NormalLaw, (normal_force, release_function, elastic_energy)
+)
 """Laws of the normal force by their names in `contact.normal_force` of a config."""

@@ -29,10 +29,7 @@ STATE_VECTOR = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
 FIRST_KNEE = HIP_ROW + 1  # row of the first knee in `hinges` and `laws`
 # states of a knee
-RELEASED = 0
-BENT = 1
-STOPPING = 2
-LOCKED = 3
+RELEASED, BENT, STOPPING, LOCKED = range(4)
 
 
 @tree.fast_fields
@@ -78,11 +75,10 @@ FORM_SHAPES: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
     **dict.fromkeys(("radius", "push_offs", "has_knee"), (2,)),
 }
-FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot pinned; columns by `locked_knees`
+    forms: Any  # (2, 4) records: row 0 with both feet free, row 1 with a foot pinned; columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
     stop: Any  # stop of both knees: IdealLock, or the Impact law (rad, N m) of a compliant stop

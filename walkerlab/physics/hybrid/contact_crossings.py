@@ -7,42 +7,14 @@ because its derivatives jump at them: solver steps that end at these points pres
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.friction import sample_switching, switching_count
 from walkerlab.physics.ground.knees import extension, extension_rate
 from walkerlab.physics.ground.normal_force import release_function, switching_penetration
 from walkerlab.physics.ground.terrain import cell_edges
-from walkerlab.physics.ground.walker import (
-    BENT,
-    BODY_VECTOR,
-    STOPPING,
-    FootMotion,
-    GroundModel,
-    OnGround,
-    foot_motion,
-    relative_to_ground,
-    sines_cosines,
-)
-from walkerlab.physics.hybrid.contact_state import (
-    AT_COMPRESSION,
-    EXTENSION,
-    EXTENSION_RATE,
-    FALL,
-    FRICTION_SWITCHES,
-    FULL_DAMPING,
-    HEIGHT,
-    LEFT_EDGE,
-    MATERIAL,
-    NO_EVENT,
-    PASSING,
-    PER_FOOT,
-    RELEASE,
-    RIGHT_EDGE,
-    SLIDE,
-    VERTICAL_VELOCITY,
-    WalkState,
-    farthest_slide,
-    material_along,
-)
+from walkerlab.physics.ground.walker import BENT, BODY_VECTOR, STOPPING, FootMotion, GroundModel, OnGround
+from walkerlab.physics.hybrid import contact_state as events
+from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, material_along
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
@@ -67,22 +39,24 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
     ground = walk_state.ground
     values = finder.values
     s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
-    sines_cosines(form, y, s, c)
-    values[PASSING, node] = 0.0
+    forms.sines_cosines(form, y, s, c)
+    values[events.PASSING, node] = 0.0
     for foot in range(2):
-        first = foot * PER_FOOT
-        motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
+        first = foot * events.PER_FOOT
+        motion = forms.relative_to_ground(system, foot, forms.foot_motion(form, foot, s, c, y))
         sample_foot(system, motion, cell_edges(ground.terrain, foot, walk_state.cells[foot]), first, node, finder)
-        values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
-        values[PASSING, node] += motion.along if foot == 1 else -motion.along
+        values[first + events.MATERIAL, node] = material_along(form, foot, motion.along, y)
+        values[events.PASSING, node] += motion.along if foot == 1 else -motion.along
     stance = walk_state.progress.stance
-    values[FALL, node] = hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
-    away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
+    values[events.FALL, node] = (
+        hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
+    )
+    away = values[stance * events.PER_FOOT + events.MATERIAL, node] - walk_state.touched[stance]
     # Squared, so that one smooth function covers slides in both directions.
-    values[SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
+    values[events.SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
     for knee in range(2):
-        values[EXTENSION + knee, node] = extension(form, knee, y)
-        values[EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
+        values[events.EXTENSION + knee, node] = extension(form, knee, y)
+        values[events.EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
 
 
 @kernel_part
@@ -90,14 +64,14 @@ def sample_foot(
     system: OnGround, motion: FootMotion, edges: tuple[float, float], first: int, j: int, finder: CrossingFinder
 ) -> None:
     values = finder.values
-    values[first + HEIGHT, j] = motion.height
-    values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
-    values[first + LEFT_EDGE, j] = motion.along - edges[0]
-    values[first + RIGHT_EDGE, j] = edges[1] - motion.along
-    values[first + RELEASE, j] = release_function(system.normal, -motion.height, -motion.vertical_velocity)
+    values[first + events.HEIGHT, j] = motion.height
+    values[first + events.VERTICAL_VELOCITY, j] = motion.vertical_velocity
+    values[first + events.LEFT_EDGE, j] = motion.along - edges[0]
+    values[first + events.RIGHT_EDGE, j] = edges[1] - motion.along
+    values[first + events.RELEASE, j] = release_function(system.normal, -motion.height, -motion.vertical_velocity)
     # A law with a single formula has no such penetration. Infinity then spans no zero.
-    values[first + FULL_DAMPING, j] = motion.height + switching_penetration(system.normal)
-    sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
+    values[first + events.FULL_DAMPING, j] = motion.height + switching_penetration(system.normal)
+    sample_switching(system.friction, motion.slip, values, first + events.FRICTION_SWITCHES, j)
 
 
 @kernel_part
@@ -107,33 +81,33 @@ def earliest_crossing(
     """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and its number."""
     ground = walk_state.ground
     progress = walk_state.progress
-    first = NO_CROSSING, NO_EVENT
+    first = NO_CROSSING, events.NO_EVENT
     for foot in range(2):
         if foot == system.form.pinned:
             continue
-        row = foot * PER_FOOT
+        row = foot * events.PER_FOOT
         # a foot in the air has no force to switch; switching after a touch belongs to the next solver step
-        inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + HEIGHT] < 0
+        inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + events.HEIGHT] < 0
         # The rows of a foot begin with its height and edges; the switching points follow.
-        end = row + RELEASE
+        end = row + events.RELEASE
         if inside and ground.frame.locate_switching and not progress.passes_switching:
-            end = row + FRICTION_SWITCHES + switching_count(system.friction)
+            end = row + events.FRICTION_SWITCHES + switching_count(system.friction)
         for event in range(row, end):
-            if ground.terrain.has_pads or (event != row + LEFT_EDGE and event != row + RIGHT_EDGE):
+            if ground.terrain.has_pads or (event != row + events.LEFT_EDGE and event != row + events.RIGHT_EDGE):
                 first = earlier_event(first, walk_state, finder, event)
         if inside and foot == progress.stance:
-            first = earlier_event(first, walk_state, finder, SLIDE)
+            first = earlier_event(first, walk_state, finder, events.SLIDE)
     # PASSING is an event only if the order of the feet matters.
     if watch_order:
-        first = earlier_event(first, walk_state, finder, PASSING)
+        first = earlier_event(first, walk_state, finder, events.PASSING)
     for knee in range(2):
         if walk_state.knee[knee] == BENT:
-            first = earlier_event(first, walk_state, finder, EXTENSION + knee)
+            first = earlier_event(first, walk_state, finder, events.EXTENSION + knee)
         elif walk_state.knee[knee] == STOPPING:
-            first = earlier_event(first, walk_state, finder, EXTENSION_RATE + knee)
-    if progress.release == AT_COMPRESSION:
-        first = earlier_event(first, walk_state, finder, progress.stance * PER_FOOT + VERTICAL_VELOCITY)
-    return earlier_event(first, walk_state, finder, FALL)
+            first = earlier_event(first, walk_state, finder, events.EXTENSION_RATE + knee)
+    if progress.release == events.AT_COMPRESSION:
+        first = earlier_event(first, walk_state, finder, progress.stance * events.PER_FOOT + events.VERTICAL_VELOCITY)
+    return earlier_event(first, walk_state, finder, events.FALL)
 
 
 @kernel_part

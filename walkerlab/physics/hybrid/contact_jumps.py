@@ -5,22 +5,13 @@ from typing import Any
 import numpy as np
 
 from walkerlab.physics.energy_channels import KNEE_STOP, KNEE_STRIKES
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.knees import lock_knee
 from walkerlab.physics.ground.motion import motion_gradient
-from walkerlab.physics.ground.walker import (
-    BODY_VECTOR,
-    STOPPING,
-    ContactWalker,
-    GroundModel,
-    OnGround,
-    new_progress,
-    sines_cosines,
-    to_form,
-    to_full,
-)
+from walkerlab.physics.ground.walker import BODY_VECTOR, STOPPING, ContactWalker, GroundModel, OnGround
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver
-from walkerlab.physics.hybrid.contact_state import EXTENSION, EXTENSION_RATE, HEIGHT, PASSING, PER_FOOT, PULSE_END
 from walkerlab.physics.kernels import vector
 from walkerlab.physics.mechanics.tree import projections
 from walkerlab.physics.solvers.events import shift_column
@@ -44,60 +35,60 @@ def change_form(
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
-    x = to_full(before.form, y, size)
-    columns = to_full(before.form, Phi[: y.size], size)
+    x = forms.to_full(before.form, y, size)
+    columns = forms.to_full(before.form, Phi[: y.size], size)
     waits = np.zeros(Phi.shape[1])
-    ends_step = event < PASSING and event % PER_FOOT == HEIGHT
+    ends_step = event < events.PASSING and event % events.PER_FOOT == events.HEIGHT
     # The touch has already exchanged the legs' roles; before it, the other leg was the stance leg.
     if ends_step:
-        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
-    if EXTENSION_RATE <= event < PULSE_END:
+        before = before._replace(progress=forms.new_progress(stance=1 - after.progress.stance))
+    if events.EXTENSION_RATE <= event < events.PULSE_END:
         # The event has already latched this knee in the walk state, whose memory `before.knee` is. Before it, the stop
         # acted.
         stopping = before.knee.copy()
-        stopping[(event - EXTENSION) % 2] = STOPPING
+        stopping[(event - events.EXTENSION) % 2] = STOPPING
         before = before._replace(knee=stopping)
         observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
     if waits.size > 0:
         rate = state_rate(before, y, size, t)
         # A pulse ends a fixed time after the touch, so no column has to wait for its end.
-        if event != PULSE_END:
+        if event != events.PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate, wait)
-    if EXTENSION <= event < PULSE_END:
+    if events.EXTENSION <= event < events.PULSE_END:
         x, lost, columns = lock_knee(whole, after.form, x, columns)
         observer.account[KNEE_STRIKES] += lost
-    z = to_form(after.form, x)
+    z = forms.to_form(after.form, x)
     if waits.size > 0:
         starts_push = ends_step and before.form.push_off != 0.0
         rate_after = np.zeros(size) if starts_push else state_rate(after, z, size, t)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
-        Phi[: z.size] = to_form(after.form, columns)
+        Phi[: z.size] = forms.to_form(after.form, columns)
     return z
 
 
 def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
     rate = np.zeros(y.size)
     right_hand_side(system, t, y, rate)
-    return to_full(system.form, rate, size)
+    return forms.to_full(system.form, rate, size)
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
     gradient = np.zeros(x.size)
     p = int(whole.places)
     half = x.size // 2
-    if event >= EXTENSION:
-        first = half + p if event >= EXTENSION_RATE else p
-        knee = (event - EXTENSION) % 2
+    if event >= events.EXTENSION:
+        first = half + p if event >= events.EXTENSION_RATE else p
+        knee = (event - events.EXTENSION) % 2
         gradient[first + whole.knees[knee]] = 1.0, -1.0
         return gradient
-    foot = event // PER_FOOT
-    row = 0 if event % PER_FOOT == HEIGHT else 1
+    foot = event // events.PER_FOOT
+    row = 0 if event % events.PER_FOOT == events.HEIGHT else 1
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
-    sines_cosines(whole, x, s, c)
+    forms.sines_cosines(whole, x, s, c)
     projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
     # `motion_gradient` differentiates the penetration, which is minus the height.
     return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

@@ -5,35 +5,16 @@ from typing import Any, NamedTuple
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import OnGround, locked_knees
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
-from walkerlab.physics.hybrid.contact_state import (
-    AT_PULSE_END,
-    NO_EVENT,
-    PASSING,
-    PULSE_END,
-    WalkState,
-    has_not_lifted,
-    is_above,
-    is_switching,
-)
+from walkerlab.physics.hybrid.contact_state import WalkState, has_not_lifted, is_above, is_switching
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
 from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
+from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.events import CrossingFinder
-from walkerlab.physics.solvers.stepping import (
-    H_NEXT,
-    OUT_OF_BUDGET,
-    STEP_DONE,
-    T_OLD,
-    T,
-    advance,
-    begin,
-    prepare_dense,
-    rewind,
-    sample,
-)
 
 NO_LIMIT = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
@@ -65,8 +46,7 @@ class EventSearch(NamedTuple):
     target: float  # s, latest end of the next solver step
     event: int  # event that is being located, or the last event
     latest: float  # s, end of the solver step in which the event first appeared, an upper bound of its time
-    approaching: bool  # whether the target is the event's expected time
-    refinements: int  # number of corrections of the expected time
+    refinements: int  # number of corrections of the event's expected time; 0 if the target is not that time
     rewinds: int  # number of rewinds of the present solver step
     accepted: bool  # whether the last solver step is valid; if not, it is repeated up to the new target
     occurs: bool  # whether the event happens at the end of the solver step
@@ -85,36 +65,41 @@ def walk_in_form(
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
     # The next step size of the form before serves as the first one of this form.
-    begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
-    search = seek(deadline(system, walk_state, method.clock[T]), NO_EVENT)
+    stepping.begin(method, system, method.clock[stepping.T], method.y, method.clock[stepping.H_NEXT])
+    search = seek(deadline(system, walk_state, method.clock[stepping.T]), events.NO_EVENT)
     terrain = walk_state.ground.terrain
     # The feet's order also decides when a walk with `until` ends, and which foothold's height a foot gets.
     watch_order = terrain.order_matters or until >= 0 or is_uneven(terrain)
     while steps_are_left(walk_state, until):
-        status = advance(method, system, search.target)
-        if status != STEP_DONE:
-            return (endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED), search.event
-        prepare_dense(method, system)
-        sample(method, system, finder.nodes, finder.states)
+        status = stepping.advance(method, system, search.target)
+        if status != stepping.STEP_DONE:
+            return (
+                endings.BUDGET_EXHAUSTED if status == stepping.OUT_OF_BUDGET else endings.SOLVER_FAILED
+            ), search.event
+        stepping.prepare_dense(method, system)
+        stepping.sample(method, system, finder.nodes, finder.states)
         fraction, event = scan(system, walk_state, watch_order, finder)
         search = aim(search, walk_state, method, finder, fraction, event)
         if not search.accepted:
-            rewind(method, system)
+            stepping.rewind(method, system)
             continue
         walk_state.progress.passes_switching = False
         observe(observer, method, system, finder, walk_state)
         note_flexion(system.form, walk_state, method.y)
-        outcome = judge(system, walk_state, method.clock[T])
+        outcome = judge(system, walk_state, method.clock[stepping.T])
         if outcome == endings.GOES_ON:
-            forget_zeros(walk_state, method.clock[T] - method.clock[T_OLD])
+            forget_zeros(walk_state, method.clock[stepping.T] - method.clock[stepping.T_OLD])
             if search.occurs:
                 outcome = react(system, observer, walk_state, method, search.event, until)
         if outcome != endings.GOES_ON:
             return outcome, search.event
-        if walk_state.progress.release == AT_PULSE_END and pulse_left(system, method.clock[T]) <= EVENT_TIME:
+        if (
+            walk_state.progress.release == events.AT_PULSE_END
+            and pulse_left(system, method.clock[stepping.T]) <= EVENT_TIME
+        ):
             release(walk_state, 1 - walk_state.progress.stance)
-            return endings.CHANGES_FORM, PULSE_END
-        search = seek(deadline(system, walk_state, method.clock[T]), search.event)
+            return endings.CHANGES_FORM, events.PULSE_END
+        search = seek(deadline(system, walk_state, method.clock[stepping.T]), search.event)
     return endings.WALKED, search.event
 
 
@@ -126,9 +111,19 @@ def steps_are_left(walk_state: WalkState, until: int) -> bool:
 @kernel_part
 def seek(target: float, event: int) -> EventSearch:
     """Start the search for the next event, with solver steps up to time `target` (s). `event` was the last event."""
-    return EventSearch(
-        target, event, latest=target, approaching=False, refinements=0, rewinds=0, accepted=False, occurs=False
-    )
+    return EventSearch(target, event, target, refinements=0, rewinds=0, accepted=False, occurs=False)
+
+
+@kernel_part
+def repeat(target: float, event: int, latest: float, refinements: int, rewinds: int) -> EventSearch:
+    """Reject the last solver step: the next one starts where it did and ends at `target` (s)."""
+    return EventSearch(target, event, latest, refinements, rewinds, accepted=False, occurs=False)
+
+
+@kernel_part
+def accept(event: int, occurs: bool) -> EventSearch:
+    """Accept the last solver step, which ends the search."""
+    return EventSearch(0.0, event, 0.0, 0, 0, accepted=True, occurs=occurs)
 
 
 @kernel_part
@@ -136,15 +131,13 @@ def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
     """Decide whether the last solver step is valid, and when the next must end. A `fraction` above 1 means no event."""
-    start, end = method.clock[T_OLD], method.clock[T]
+    start, end = method.clock[stepping.T_OLD], method.clock[stepping.T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
     # This solver step was shortened to end at an event, but shows none: it may have ended just before it.
-    if search.approaching and end >= search.target:
+    if search.refinements > 0 and end >= search.target:
         return confirm(search, start, time_to_zero(method, finder, search.event))
-    return EventSearch(
-        end, search.event, latest=end, approaching=False, refinements=0, rewinds=0, accepted=True, occurs=False
-    )
+    return accept(search.event, False)
 
 
 @kernel_part
@@ -152,51 +145,22 @@ def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
-    latest = search.latest if search.approaching else end
+    latest = search.latest if search.refinements > 0 else end
     # If another event comes first now, its refinements count from zero.
-    refinements = search.refinements if search.approaching and event == search.event else 0
+    refinements = search.refinements if event == search.event else 0
     # A solver step cannot have length zero.
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < MAX_REWINDS:
-        return EventSearch(
-            start + wait,
-            event,
-            latest,
-            approaching=True,
-            refinements=refinements + 1,
-            rewinds=search.rewinds + 1,
-            accepted=False,
-            occurs=False,
-        )
+        return repeat(start + wait, event, latest, refinements + 1, search.rewinds + 1)
     if early and is_switching(event):
         # the event function is too far from a polynomial on this solver step: try half of it
         if search.rewinds < MAX_REWINDS:
-            return EventSearch(
-                0.5 * (start + end),
-                event,
-                latest,
-                approaching=False,
-                refinements=0,
-                rewinds=search.rewinds + 1,
-                accepted=False,
-                occurs=False,
-            )
+            return repeat(0.5 * (start + end), event, latest, 0, search.rewinds + 1)
         # a short solver step does not help either: ignore this event, but no other event in it
         walk_state.progress.passes_switching = True
-        return EventSearch(
-            end, event, latest, approaching=False, refinements=0, rewinds=0, accepted=False, occurs=False
-        )
-    return EventSearch(
-        end,
-        event,
-        latest,
-        approaching=True,
-        refinements=refinements,
-        rewinds=search.rewinds,
-        accepted=True,
-        occurs=True,
-    )
+        return repeat(end, event, latest, 0, 0)
+    return accept(event, True)
 
 
 @kernel_part
@@ -205,30 +169,10 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     occurs = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < MAX_DOUBTFUL_REWINDS
     target = search.target + wait
-    refinements = search.refinements + 1
-    rewinds = search.rewinds + 1
     # The event cannot lie beyond the solver step in which it first appeared.
     if not occurs and doubtful and start < target <= search.latest:
-        return EventSearch(
-            target,
-            search.event,
-            search.latest,
-            approaching=True,
-            refinements=refinements,
-            rewinds=rewinds,
-            accepted=False,
-            occurs=False,
-        )
-    return EventSearch(
-        search.target,
-        search.event,
-        search.latest,
-        approaching=True,
-        refinements=refinements,
-        rewinds=rewinds,
-        accepted=True,
-        occurs=occurs,
-    )
+        return repeat(target, search.event, search.latest, search.refinements + 1, search.rewinds + 1)
+    return accept(search.event, occurs)
 
 
 @kernel_part
@@ -246,20 +190,20 @@ def react(
     """Apply the event at the end of the last solver step, and return the outcome, GOES_ON or CHANGES_FORM."""
     steps = walk_state.progress.steps
     locked = locked_knees(walk_state.knee)
-    outcome = apply_event(system, observer, walk_state, event, method.clock[T], method.y)
+    outcome = apply_event(system, observer, walk_state, event, method.clock[stepping.T], method.y)
     if outcome != endings.GOES_ON:
         return outcome
     stepped = walk_state.progress.steps > steps
     if stepped:
         note_work(observer, system, method.y)
-    if (stepped and is_pinned(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
+    if (stepped and is_pinned(system)) or (event == events.PASSING and 0 <= until <= walk_state.progress.steps):
         return endings.WALKED
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return endings.CHANGES_FORM
     # The force is continuous at its switching points, so the method continues with its history.
     if not is_switching(event):
-        begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
+        stepping.begin(method, system, method.clock[stepping.T], method.y, method.clock[stepping.H_NEXT])
     return endings.GOES_ON
 
 
@@ -295,7 +239,7 @@ def time_limits(walk_state: WalkState) -> tuple[float, float]:
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
     """Estimate the time (s) from the end of the last solver step to an event function's zero, from its final slope."""
     last = finder.nodes.size - 1
-    h = method.clock[T] - method.clock[T_OLD]
+    h = method.clock[stepping.T] - method.clock[stepping.T_OLD]
     change = finder.values[event, last] - finder.values[event, last - 1]
     span = (finder.nodes[last] - finder.nodes[last - 1]) * h
     if change == 0.0:

@@ -11,19 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.energy_channels import (
-    DAMPING_LOSS,
-    EDGES,
-    ENTRIES,
-    FORWARD,
-    FRICTION_LOSS,
-    HIP_WORK,
-    KNEE_STOP,
-    LOSS_ENTRIES,
-    PUSH_OFF,
-    SUPPLY_ENTRIES,
-    TORQUE,
-)
+from walkerlab.physics import energy_channels as channels
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies, hinge_powers
 from walkerlab.physics.ground.walker import STATE_VECTOR, OnGround, one_foot_motion, relative_to_ground, store_whole
@@ -165,12 +153,12 @@ class ContactSamples(NamedTuple):
     @property
     def dissipated_J(self) -> Any:
         """Energy dissipated up to each sample (samples, 5), in the order of `energy_channels.LOSSES`."""
-        return self.account[:, LOSS_ENTRIES]
+        return self.account[:, channels.LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
         """Energy supplied by push-off and hip up to each sample (samples, 2)."""
-        return self.account[:, SUPPLY_ENTRIES]
+        return self.account[:, channels.SUPPLY_ENTRIES]
 
 
 @fast_fields
@@ -226,7 +214,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
         fraction = (samples.time_s[index] - t) / h
         interpolate(method, system, fraction, y)
         store_whole(system.form, y, samples.states[index])
-        for entry in range(ENTRIES):
+        for entry in range(channels.ENTRIES):
             samples.account[index, entry] = observer.account[entry]
         add_work_until(method, system, fraction, samples.account[index])
         for k in range(2):
@@ -244,8 +232,8 @@ def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
     account = observer.account
     add_work_until(method, system, 1.0, account)
     # TORQUE and FORWARD are parts of HIP_WORK and do not count again.
-    lost = -account[PUSH_OFF] - account[HIP_WORK]
-    for entry in range(PUSH_OFF):
+    lost = -account[channels.PUSH_OFF] - account[channels.HIP_WORK]
+    for entry in range(channels.PUSH_OFF):
         lost += account[entry]
     residual = end_energy(system, method.y) + lost - observer.tally.start_energy
     observer.tally.residual = max(observer.tally.residual, abs(residual))
@@ -256,16 +244,16 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
     torque = hinge_law(system.form, HIP_ROW).torque
     if torque != 0.0:
         given = torque_work(torque, method, system, finder, LEGS_TURN, 1.0)
-        observer.account[TORQUE] += given.net
-        observer.account[FORWARD] += given.positive
+        observer.account[channels.TORQUE] += given.net
+        observer.account[channels.FORWARD] += given.positive
 
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """Copy the account at a step's end, for the work in completed steps. The copied hip work includes the springs."""
-    for entry in range(ENTRIES):
+    for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
+    observer.account_at_touch[channels.HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
 
 
 @kernel_part
@@ -286,7 +274,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
 @kernel_part
 def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any) -> None:
     if system.has_ground[foot] != 0 and observer.track_energy:
-        observer.account[EDGES] += foot_elastic_energy(system, foot, y)
+        observer.account[channels.EDGES] += foot_elastic_energy(system, foot, y)
 
 
 @kernel
@@ -326,14 +314,14 @@ def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span
     for foot in range(2):
         if system.has_ground[foot] != 0:
             damping, friction = foot_work(system, states, weights, foot, span)
-            account[DAMPING_LOSS] += damping
-            account[FRICTION_LOSS] += friction
+            account[channels.DAMPING_LOSS] += damping
+            account[channels.FRICTION_LOSS] += friction
     for i in range(1, len(nodes)):
         weight = span * weights[i]
         supplied, lost = hinge_powers(system, states[i])
-        account[HIP_WORK] += weight * supplied
-        account[KNEE_STOP] += weight * lost
-        account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
+        account[channels.HIP_WORK] += weight * supplied
+        account[channels.KNEE_STOP] += weight * lost
+        account[channels.PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 
 @kernel_part

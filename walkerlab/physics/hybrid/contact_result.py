@@ -8,30 +8,17 @@ from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSS_ENTRIES, LOSSES, PUSH_OFF, TORQUE
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.terrain import is_uneven
-from walkerlab.physics.ground.walker import (
-    BODY_VECTOR,
-    ContactWalker,
-    FootMotion,
-    OnGround,
-    feet_motion,
-    floating_state,
-    foot_force,
-    place_on_ground,
-    sines_cosines,
-    to_form,
-    to_full,
-)
+from walkerlab.physics.ground.walker import BODY_VECTOR, ContactWalker, FootMotion, OnGround
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_crossings import hip_height
 from walkerlab.physics.hybrid.contact_jumps import change_form
 from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
 from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples, new_tangent
 from walkerlab.physics.hybrid.contact_state import (
-    EVENT_ROWS,
-    HEIGHT,
-    PER_FOOT,
     JudgedGround,
     WalkState,
     material_along,
@@ -68,7 +55,7 @@ class Stopped:
 def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
     """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
     energies = np.zeros((samples.time_s.size, 3))
-    fill_energies(place_on_ground(walker, (False, False)), samples, energies)
+    fill_energies(forms.place_on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
@@ -97,13 +84,13 @@ def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> N
 @kernel
 def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None:
     for i in range(samples.states.shape[0]):
-        motions = feet_motion(walker.forms[0, 0], samples.states[i])
+        motions = forms.feet_motion(walker.forms[0, 0], samples.states[i])
         for foot in range(2):
             along, height, slip, vertical_velocity = motions[foot]
             height -= samples.level[i, foot]
             feet[i, foot, 0], feet[i, foot, 1], feet[i, foot, 4] = along, height, slip
             if samples.has_ground[i, foot] != 0 and height < 0.0:
-                force = foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
+                force = forms.foot_force(walker, FootMotion(along, height, slip, vertical_velocity))
                 feet[i, foot, 2], feet[i, foot, 3] = force.normal.force, force.along
 
 
@@ -155,7 +142,9 @@ def new_observer(
     tally = new_record(CONTACT_TALLY)
     # The work in completed steps needs the springs' energy at the start even if no balance is kept.
     if track_energy or walker.whole.sprung:
-        system = place_on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        system = forms.place_on_ground(
+            walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress
+        )
         tally.start_energy = total_energy(system, y)
         tally.start_spring = hinge_energies(system, y)[0]
         # The tolerance is relative to this energy, which must not depend on how far down the slope the walk starts.
@@ -175,7 +164,7 @@ def new_observer(
 
 def present_walker(walker: ContactWalker, walk_state: WalkState, pinned: bool = False) -> OnGround:
     """Return the walker in its present form. It shares memory with the walk state."""
-    return place_on_ground(
+    return forms.place_on_ground(
         walker, walk_state.has_ground, walk_state.knee, pinned, walk_state.level, walk_state.progress
     )
 
@@ -200,15 +189,15 @@ def walk_on(
     half = len(start) // 2
     # A pinned form has no coordinates of the root.
     root = 2 if pinned else 0
-    y = to_form(system.form, (*start[root:half], *start[half + root :]))
+    y = forms.to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
-        tangent[: y.size] = to_form(system.form, tangent)
+        tangent[: y.size] = forms.to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
     # Forms have states of different sizes, and each size needs a method with memory of that size. They share clock and
     # counts, so that they act as one method.
     by_size = {y.size: lead}
-    finder = finder_for(lead, EVENT_ROWS, walker.size)
+    finder = finder_for(lead, events.EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = share_counts(tolerances.new(y.size), lead.clock, lead.counts)
@@ -221,8 +210,8 @@ def walk_on(
         system = present_walker(walker, walk_state, pinned)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
-        tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
-    end = floating_state(system.form, method.y, walker.size)
+        tangent[:] = forms.to_full(system.form, tangent[: method.y.size], walker.size)
+    end = forms.floating_state(system.form, method.y, walker.size)
     walk_state.progress.stopped_at = lead.clock[T]
     return Stopped(check_balance(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:BUDGET].copy())
 
@@ -247,7 +236,7 @@ def walk_contact(
     frame = ground.frame
     s = vector(BODY_VECTOR)
     c = vector(BODY_VECTOR)
-    sines_cosines(walker.whole, start, s, c)
+    forms.sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground, stance, steps, start)
         stopped = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
@@ -304,10 +293,10 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     foot = int(walker.forms[1, 0]["pinned"])
     steps = walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
-    walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
+    walk_state.touched[foot] = material_along(walker.whole, foot, forms.feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
     # The released foot is exactly at the surface, which is no touch.
-    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 1
+    walk_state.at_zero[foot * events.PER_FOOT + events.HEIGHT] = 1
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:

@@ -11,19 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import MIN_FLEXION, extension, extension_rate
 from walkerlab.physics.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
-from walkerlab.physics.ground.walker import (
-    BENT,
-    LOCKED,
-    RELEASED,
-    ContactWalker,
-    FootMotion,
-    GroundModel,
-    WalkProgress,
-    feet_motion,
-    new_progress,
-)
+from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, ContactWalker, FootMotion, GroundModel, WalkProgress
 from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
 from walkerlab.physics.kernels import kernel_part, pass_by_reference
 from walkerlab.physics.solvers.system import State
@@ -113,7 +104,7 @@ class WalkState(NamedTuple):
 
 
 def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, steps: int, y: State) -> WalkState:
-    feet = feet_motion(walker.whole, y)
+    feet = forms.feet_motion(walker.whole, y)
     terrain = ground.terrain
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
@@ -146,7 +137,7 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
         leaving=np.zeros(2, np.int8),
         sides=sides,
         at_zero=at_zero,
-        progress=new_progress(stance),
+        progress=forms.new_progress(stance),
     )
 
 
@@ -164,7 +155,7 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
         if extension(whole, swing, y) < -MIN_FLEXION:
             knee[swing] = BENT
         straight = max(abs(extension(whole, swing, y)), abs(extension_rate(whole, swing, y))) < STRAIGHT_KNEE
-        heights = [foot.height for foot in feet_motion(whole, y)]
+        heights = [foot.height for foot in forms.feet_motion(whole, y)]
         # The longest lever stands for the leg length, which a ContactWalker does not contain.
         if straight and abs(heights[0] - heights[1]) > ON_GROUND * abs(whole.foot_y[0]).max():
             knee[swing] = LOCKED

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import MIN_FLEXION, IdealLock, extension
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import (
@@ -11,38 +12,10 @@ from walkerlab.physics.ground.terrain import (
     height_of_pad,
     is_uneven,
 )
-from walkerlab.physics.ground.walker import (
-    BENT,
-    LOCKED,
-    RELEASED,
-    STOPPING,
-    FootMotion,
-    GroundModel,
-    OnGround,
-    feet_motion,
-    relative_to_ground,
-)
+from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, STOPPING, FootMotion, GroundModel, OnGround
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
-from walkerlab.physics.hybrid.contact_state import (
-    AT_COMPRESSION,
-    AT_PULSE_END,
-    EXTENSION,
-    EXTENSION_RATE,
-    FALL,
-    HEIGHT,
-    LEFT_EDGE,
-    NOT_DUE,
-    PASSING,
-    PER_FOOT,
-    RIGHT_EDGE,
-    SLIDE,
-    VERTICAL_VELOCITY,
-    WalkState,
-    farthest_slide,
-    is_above,
-    is_ahead,
-    material_along,
-)
+from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, is_above, is_ahead, material_along
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 
@@ -57,18 +30,18 @@ def apply_event(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
     """Apply an event to the walk state, and return an outcome if the event ends the walk, otherwise GOES_ON."""
-    if event == FALL:
+    if event == events.FALL:
         return FELL
-    if event == SLIDE:
+    if event == events.SLIDE:
         return SLID
     walk_state.at_zero[event] = 1
-    if event >= EXTENSION:
+    if event >= events.EXTENSION:
         knee_stops(system.stop, walk_state, event, t)
         return GOES_ON
-    first, second = feet_motion(system.form, y)
-    feet = relative_to_ground(system, 0, first), relative_to_ground(system, 1, second)
-    if event == PASSING:
-        walk_state.sides[PASSING] = -walk_state.sides[PASSING]
+    first, second = forms.feet_motion(system.form, y)
+    feet = forms.relative_to_ground(system, 0, first), forms.relative_to_ground(system, 1, second)
+    if event == events.PASSING:
+        walk_state.sides[events.PASSING] = -walk_state.sides[events.PASSING]
         outcome = GOES_ON
         for foot in range(2):
             # in a pinned step, equal legs pass with both feet at the surface; rounding must not decide which is above
@@ -78,9 +51,9 @@ def apply_event(
             if (above or walk_state.has_ground[foot] == 0) and next_foothold_counts(walk_state, foot):
                 outcome = set_foothold(system, observer, walk_state, feet[foot].height, foot, y)
         return outcome
-    foot = event // PER_FOOT
-    kind = event % PER_FOOT
-    if kind == HEIGHT:
+    foot = event // events.PER_FOOT
+    kind = event % events.PER_FOOT
+    if kind == events.HEIGHT:
         walk_state.sides[event] = -walk_state.sides[event]
         if is_above(walk_state, foot):
             lift(system.form, walk_state, feet, foot, t, y)
@@ -88,12 +61,14 @@ def apply_event(
                 return set_foothold(system, observer, walk_state, feet[foot].height, foot, y)
         else:
             return touch(system.form, walk_state, feet, foot, t, y)
-    elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
+    elif kind == events.LEFT_EDGE or kind == events.RIGHT_EDGE:
         # From here on the row belongs to the same edge of the new cell, one pitch away.
         walk_state.at_zero[event] = 0
         # One edge of the old cell is the opposite edge of the new one, so that event function is now zero.
-        walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
-        walk_state.cells[foot] += 1 if kind == RIGHT_EDGE else -1
+        walk_state.at_zero[
+            foot * events.PER_FOOT + (events.LEFT_EDGE if kind == events.RIGHT_EDGE else events.RIGHT_EDGE)
+        ] = 1
+        walk_state.cells[foot] += 1 if kind == events.RIGHT_EDGE else -1
         if not has_ground_in_cell(walk_state.cells[foot]):
             observe_edge(observer, system, foot, y)
             walk_state.has_ground[foot] = 0
@@ -105,11 +80,11 @@ def apply_event(
         else:
             # The foot is below the top of the pad: it has hit the pad's side.
             return OFF_PAD
-    elif kind == VERTICAL_VELOCITY:
+    elif kind == events.VERTICAL_VELOCITY:
         # This function is not watched again before the next touch, when it has another value.
         walk_state.at_zero[event] = 0
         if pulse_left(system, t) > 0.0:
-            walk_state.progress.release = AT_PULSE_END
+            walk_state.progress.release = events.AT_PULSE_END
         else:
             release(walk_state, 1 - foot)
     return GOES_ON
@@ -129,8 +104,8 @@ def set_level(
     if not is_above(walk_state, foot):
         observe_edge(observer, system, foot, y)
     walk_state.level[foot] = level
-    walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if above > 0.0 else -1
-    walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
+    walk_state.sides[foot * events.PER_FOOT + events.HEIGHT] = 1 if above > 0.0 else -1
+    walk_state.at_zero[foot * events.PER_FOOT + events.HEIGHT] = 0
 
 
 @kernel_part
@@ -252,17 +227,17 @@ def lock_catches(stop: IdealLock) -> bool:
 @kernel_part
 def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
     """Handle a knee's event: a straight knee locks or enters its stop. A knee that turns back in its stop latches."""
-    if event < EXTENSION_RATE and not catches(stop):
-        walk_state.knee[(event - EXTENSION) % 2] = STOPPING
+    if event < events.EXTENSION_RATE and not catches(stop):
+        walk_state.knee[(event - events.EXTENSION) % 2] = STOPPING
         return
     walk_state.at_zero[event] = 0
-    walk_state.knee[(event - EXTENSION) % 2] = LOCKED
+    walk_state.knee[(event - events.EXTENSION) % 2] = LOCKED
     walk_state.knee_strike[walk_state.progress.steps] = t
 
 
 @kernel_part
 def release(walk_state: WalkState, knee: int) -> None:
-    walk_state.progress.release = NOT_DUE
+    walk_state.progress.release = events.NOT_DUE
     walk_state.knee[knee] = RELEASED
 
 
@@ -277,11 +252,11 @@ def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> No
     """Release the trailing knee at a step's touch, or note what it waits for (`AT_COMPRESSION`, `AT_PULSE_END`)."""
     if form.has_knee[trailing] != 0:
         if form.release_at_touch and form.push_off != 0.0:
-            walk_state.progress.release = AT_PULSE_END
+            walk_state.progress.release = events.AT_PULSE_END
         elif form.release_at_touch:
             release(walk_state, trailing)
         else:
-            walk_state.progress.release = AT_COMPRESSION
+            walk_state.progress.release = events.AT_COMPRESSION
 
 
 @kernel_part

@@ -9,36 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid import rigid_walk
 from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
 from walkerlab.physics.hybrid.rigid_record import Observer, RigidTally, new_observer, observe_start
-from walkerlab.physics.hybrid.rigid_walk import (
-    EVENTS,
-    LONGEST_SWING,
-    SHORTEST_LANDING,
-    hip_above_fall,
-    knee_angle,
-    new_heel_strikes,
-    walk,
-)
 from walkerlab.physics.hybrid.walk_record import Array, DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import uncompiled
-from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_energy, hinge_law
+from walkerlab.physics.mechanics import rigid_model as rigid
+from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_energy, hinge_law
 from walkerlab.physics.mechanics.impact import push_off_work
-from walkerlab.physics.mechanics.rigid_model import (
-    AT_STRIKE,
-    BENT,
-    NO_SHANK,
-    STANCE,
-    Mode,
-    RigidModel,
-    apply_couplings,
-    compute_in_turns,
-    energies,
-    energy_at_touch,
-    models_in_turn,
-    step_lengths,
-    swing_foot,
-)
+from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
 from walkerlab.physics.solvers.registry import Tolerances, finder_for
 from walkerlab.physics.solvers.stepping import BUDGET, RHS, clear_counts
 from walkerlab.physics.solvers.system import State
@@ -49,6 +28,7 @@ BUDGET_OF_A_STEP = 50_000
 # friction coefficient, about as for rubber on dry concrete
 MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
+MAXIMA = ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio")  # of a tally and a result
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
 
@@ -138,15 +118,15 @@ def take_walk(
     recorder.heights = heights
     rises = np.zeros(steps + 1) if heights is None else np.diff(heights, prepend=heights[0])
     if rises.any():
-        judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
-        recorder.nearest = SHORTEST_LANDING * judged_by
-    height = swing_foot(walker, start)[0]
+        judged_by = abs(rigid.swing_foot(walker, start)[1]) if step_length is None else step_length
+        recorder.nearest = rigid_walk.SHORTEST_LANDING * judged_by
+    height = rigid.swing_foot(walker, start)[0]
     # A start in mid-step, where no foot leaves the ground. With its own height as the foothold that it leaves, the
     # swing foot's event function is not taken for zero at the start.
     if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
-    if hip_above_fall(walker, start) < 0.0:
+    if rigid_walk.hip_above_fall(walker, start) < 0.0:
         return recorder.build_result(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
@@ -159,7 +139,7 @@ def take_walk(
 
 def is_straight(walker: RigidModel, start: State) -> bool:
     """Whether thigh and shank of the swing leg have the same angle and rate."""
-    knees = (knee_angle(walker, start, first) for first in (0, len(start) // 2))
+    knees = (rigid_walk.knee_angle(walker, start, first) for first in (0, len(start) // 2))
     return all(abs(knee) < STRAIGHT_KNEE for knee in knees)
 
 
@@ -179,12 +159,14 @@ class Recorder:
         self.steps = 0
         self.grid_index = 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
-        self.finder = finder_for(method, EVENTS, len(walker.zero_state))
+        self.finder = finder_for(method, rigid_walk.EVENTS, len(walker.zero_state))
         # walks with a library's method run in Python
-        self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
+        self.walk: Callable[..., tuple[int, int]] = (
+            rigid_walk.walk if tolerances.compiled else uncompiled(rigid_walk.walk)
+        )
         self.numbers = len(walker.zero_state)
         self.kneed = walker.kneed or walker.exchanged.kneed
-        self.models = models_in_turn(walker)
+        self.models = rigid.models_in_turn(walker)
         self.seen = new_observer(np.zeros(0), self.numbers)
         self.tally: RigidTally = self.seen.tally[()]
         self.counts = np.zeros_like(method.counts)
@@ -198,11 +180,11 @@ class Recorder:
     def walk_on(self, rises: Array) -> Outcome:
         """Take up to `rises.size - 1` more steps. `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
-        seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
+        seen = rigid_walk.new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
         if self.sampled:
             # Enough samples even if every step takes the longest time that a swing may take.
-            room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            room = math.ceil(steps * rigid_walk.LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             # Each block of steps starts at a time of zero.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
@@ -216,7 +198,7 @@ class Recorder:
         part = observer.tally[()]
         for name in ("min_normal_force", "min_impulse"):
             total[name] = min(total[name], part[name])
-        for name in ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio"):
+        for name in MAXIMA:
             total[name] = max(total[name], part[name])
         for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
             total[name] += part[name]
@@ -226,7 +208,7 @@ class Recorder:
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
         # There are no knee strikes in steps in which a leg without a knee swings.
         for k, shank in enumerate(self.models["shank"]):
-            knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
+            knees[k :: self.models.size] = knees[k :: self.models.size] if shank != rigid.NO_SHANK else np.nan
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
         for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
@@ -238,45 +220,6 @@ class Recorder:
             self.state = as_state(after[-1])
             self.time = float(strikes[-1])
         return Outcome(status)
-
-    def _mean_energy(self, strikes: Array, after: Array) -> float:
-        """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
-        touched = np.append(self.start[STANCE], after[:, STANCE])
-        zeros = compute_in_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
-        if self.tally.duration == 0.0:
-            return float(sum(energies(self.walker, self.start)) - zeros[0])
-        # The last duration is that of a swing without a heel strike.
-        durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
-        return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
-
-    def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
-        """Compute the work done in the completed steps and the energy residual (J). `gravity` is gravity's work (J)."""
-        # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
-        # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
-        walker = self.walker
-        rows = range(len(self.walker.hinges))
-        laws = [hinge_law(walker, row) for row in rows]
-        starts = np.vstack((self.start, after[:-1])) if self.steps else before
-        apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
-        torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
-        stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
-        hip = torque - float(np.sum(stored))
-        # the energy of the springs is counted as work of the hip
-        unsprung = walker.changed(laws=0.0) if walker.sprung else walker
-        last = unsprung.exchanged if self.steps % 2 else unsprung
-        ends = [
-            sum(energies(model, y)) - energy_at_touch(model, y[STANCE])
-            for model, y in ((unsprung, self.start), (last, self.state))
-        ]
-        residual = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
-        knees = residual if walker.damped_knees else None
-        hip = hip + residual if laws[HIP_ROW].damping else hip
-        residual = 0.0 if knees is not None or laws[HIP_ROW].damping else residual
-        pushed = walker.push_off or walker.exchanged.push_off
-        push = float(compute_in_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
-        weight = float(walker.mass * walker.gravity)
-        forward = float(self.tally.forward_work)
-        return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """Merge the samples on the grid with samples on both sides of the heel strikes."""
@@ -299,18 +242,20 @@ class Recorder:
     def build_result(self, outcome: Outcome) -> RigidWalkResult:
         # No swing has begun, so the start has not been observed yet.
         if self.tally.duration == 0.0:
-            observe_start(self.seen, Mode(self.walker, BENT), self.start)
+            observe_start(self.seen, Mode(self.walker, rigid.BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
         steps = np.arange(len(before))
-        lengths = compute_in_turns(self.walker, steps, step_lengths, np.vstack((self.start, after))[:-1], before)
+        lengths = rigid.compute_in_turns(
+            self.walker, steps, rigid.step_lengths, np.vstack((self.start, after))[:-1], before
+        )
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
         )
-        driven, residual = self._driven_work(before, after, gravity)
+        driven, residual = driven_work(self.walker, self.tally, self.start, before, after, gravity)
         return RigidWalkResult(
             outcome=outcome,
             touch_time_s=strikes,
@@ -327,21 +272,65 @@ class Recorder:
             before=before,
             after=after,
             min_normal_force=float(self.tally.min_normal_force),
-            max_friction_ratio=float(self.tally.max_friction_ratio),
-            max_scuff_depth=float(self.tally.max_scuff_depth),
             min_normal_impulse=float(self.tally.min_impulse) if self.steps else None,
-            max_impulse_ratio=float(self.tally.max_impulse_ratio),
-            energy_drift=float(self.tally.energy_drift),
-            mean_energy=self._mean_energy(strikes, after),
+            **{name: float(self.tally[name]) for name in MAXIMA},
+            mean_energy=mean_energy(self.walker, self.tally, self.start, strikes, after),
             samples=join(self.pieces) if self.pieces else None,
         )
+
+
+def mean_energy(walker: RigidModel, tally: RigidTally, start: State, strikes: Array, after: Array) -> float:
+    """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
+    touched = np.append(start[rigid.STANCE], after[:, rigid.STANCE])
+    zeros = rigid.compute_in_turns(walker, np.arange(touched.size), rigid.energy_at_touch, touched)
+    if tally.duration == 0.0:
+        return float(sum(rigid.energies(walker, start)) - zeros[0])
+    # The last duration is that of a swing without a heel strike.
+    durations = np.diff(strikes, prepend=0.0, append=max([float(tally.duration), *strikes[-1:]]))
+    return float((tally.energy_integral - zeros @ durations) / float(tally.duration))
+
+
+def driven_work(
+    walker: RigidModel, tally: RigidTally, start: State, before: Array, after: Array, gravity: float
+) -> tuple[DrivenWork, float]:
+    """Compute the work done in the completed steps and the energy residual (J). `gravity` is gravity's work (J)."""
+    # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
+    # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
+    rows = range(len(walker.hinges))
+    laws = [hinge_law(walker, row) for row in rows]
+    starts = np.vstack((start, after[:-1])) if len(after) else before
+    apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
+    torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
+    stored = [elastic_energies(laws[row], apart[1][row]) - elastic_energies(laws[row], apart[0][row]) for row in rows]
+    hip = torque - float(np.sum(stored))
+    # the energy of the springs is counted as work of the hip
+    unsprung = walker.changed(laws=0.0) if walker.sprung else walker
+    last = unsprung.exchanged if len(after) % 2 else unsprung
+    ends = [
+        sum(rigid.energies(model, y)) - rigid.energy_at_touch(model, y[rigid.STANCE])
+        for model, y in ((unsprung, start), (last, as_state(after[-1]) if len(after) else start))
+    ]
+    residual = float(ends[1] - ends[0] - gravity - hip + tally.strike_loss)
+    knees = residual if walker.damped_knees else None
+    hip = hip + residual if laws[HIP_ROW].damping else hip
+    residual = 0.0 if knees is not None or laws[HIP_ROW].damping else residual
+    pushed = walker.push_off or walker.exchanged.push_off
+    push = float(rigid.compute_in_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
+    weight = float(walker.mass * walker.gravity)
+    forward = float(tally.forward_work)
+    return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
+
+
+def elastic_energies(law: SpringDamper, angles: Array) -> Array:
+    """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
+    return np.array([hinge_energy(law, angle) for angle in angles])
 
 
 def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
     """Return a state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
-    rates = [(stance if body == STANCE else swing) * rate for body, rate in enumerate(state[n:])]
-    return (*state[:n], *apply_couplings(walker, AT_STRIKE, rates).tolist())
+    rates = [(stance if body == rigid.STANCE else swing) * rate for body, rate in enumerate(state[n:])]
+    return (*state[:n], *rigid.apply_couplings(walker, rigid.AT_STRIKE, rates).tolist())
 
 
 def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:

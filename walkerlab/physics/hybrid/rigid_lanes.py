@@ -18,28 +18,9 @@ from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law,
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, RigidModel, feet_on_slope
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
-from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
-from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
-from walkerlab.physics.solvers.lanes import (
-    LANE_ERROR_3,
-    LANE_ERROR_5,
-    WIDTH,
-    Jet,
-    Lanes,
-    Quintic,
-    any_positive,
-    choose,
-    combine,
-    derivative,
-    error_sums,
-    evaluate_quintic,
-    first_fall,
-    hermite,
-    load_lanes,
-    run_stages,
-    store_lanes,
-    teach_arithmetic,
-)
+from walkerlab.physics.solvers import dop853, events, lanes
+from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, Jet, Quintic
+from walkerlab.physics.solvers.lanes import Lanes
 from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
@@ -83,8 +64,10 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Convert a model of two equal straight legs for lanes, or return None for any other model."""
-    if len(model.arm_x) != 2 or model.kneed or model.legs_differ:
+    """Convert a model of two equal straight legs with a linear hip for lanes, or return None for any other model."""
+    hip = hinge_law(model, HIP_ROW)
+    # Laws of extensions are written for numbers, not for lanes.
+    if len(model.arm_x) != 2 or model.kneed or model.legs_differ or type(hip) is not SpringDamper:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (endings.FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
@@ -95,7 +78,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
     return TwoLegs(
         model,
         **values,
-        hip=hinge_law(model, HIP_ROW),
+        hip=hip,
         upright=math.atan2(x, y),
         # With large feet `lowest` may be below -1: the hip cannot get that low.
         fallen=math.acos(max(-1.0, lowest)),
@@ -103,7 +86,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
     )
 
 
-@derivative.case(TwoLegs, forced_inline=True)
+@lanes.derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     """Evaluate the equations of motion of rigid_model.py, written out for two bodies, for floats or lanes."""
     R = system.radius
@@ -153,11 +136,11 @@ class LaneMemory(NamedTuple):
 
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
-    teach_arithmetic()
-    # A finder of degree 5 fits the quintics of lanes.py.
-    return LaneMemory(
-        rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
-    )
+    lanes.teach_arithmetic()
+    rows = np.zeros((LANE_ROWS, lanes.WIDTH))
+    slots = np.full((2, lanes.WIDTH), NOBODY, np.int64)
+    # A finder of degree 5 fits the quintics.
+    return LaneMemory(rtol, atol, rows, slots, events.new_crossing_finder(5))
 
 
 class Fates(NamedTuple):
@@ -179,13 +162,13 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
     """Walk from each start (n, 4), both feet on the slope, until the observer ends the walk or it ends by itself."""
     slots = memory.slots
     waiting = 0
-    for lane in range(WIDTH):
+    for lane in range(lanes.WIDTH):
         waiting = refill(walker, memory, starts, fates, lane, waiting)
     walking = True
     while walking:
         if try_steps(walker, memory):
             walking = False
-            for lane in range(WIDTH):
+            for lane in range(lanes.WIDTH):
                 if slots[SLOT_OF_START, lane] == NOBODY:
                     continue
                 if memory.rows[HAS_EVENT, lane] > 0.0:
@@ -218,7 +201,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
 @kernel_part
 def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: State, h: float) -> None:
     rows = memory.rows
-    rate = derivative(walker, t, y)
+    rate = lanes.derivative(walker, t, y)
     for i in range(4):
         rows[START_STATE + i, lane], rows[START_RATE + i, lane] = y[i], rate[i]
     rows[NEXT_STEP, lane], rows[LANE_TIME, lane] = h, t
@@ -228,7 +211,7 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
 
 @kernel_part
 def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    return load_lanes(rows, row), load_lanes(rows, row + 1), load_lanes(rows, row + 2), load_lanes(rows, row + 3)
+    return lanes.load(rows, row), lanes.load(rows, row + 1), lanes.load(rows, row + 2), lanes.load(rows, row + 3)
 
 
 @kernel_part
@@ -241,39 +224,41 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     rows = memory.rows
     y = load_state(rows, START_STATE)
     k1 = load_state(rows, START_RATE)
-    left = load_lanes(rows, TIME_LEFT)
-    tries = load_lanes(rows, TRIES) + 1.0
-    h = min(load_lanes(rows, NEXT_STEP), left)
-    stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
-    error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
+    left = lanes.load(rows, TIME_LEFT)
+    tries = lanes.load(rows, TRIES) + 1.0
+    h = min(lanes.load(rows, NEXT_STEP), left)
+    stages, end, end_rate = dop853.run_stages(walker, 0.0, y, k1, h)
+    by_order_5 = lanes.combine(dop853.LANE_ERROR_5, stages)
+    by_order_3 = lanes.combine(dop853.LANE_ERROR_3, stages)
+    error_5, error_3 = dop853.error_sums(memory, y, end, by_order_5, by_order_3)
     # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below. h is negative where a lane goes
     # back to a heel strike.
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
-    change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
-    change = min(GROW_MOST, max(SHRINK_MOST, change))
+    change = dop853.SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
+    change = min(dop853.GROW_MOST, max(dop853.SHRINK_MOST, change))
     accepted = 1.0 - error
     # positive if this solver step uses up the time
     over = TINY_ERROR - (left - h)
     pendulum_time = walker.pendulum_time
     stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
-    attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVALS))
+    attention = max(may_end(walker, y, end, h), over, lanes.load(rows, ARRIVALS))
     # A rejected solver step needs no attention: the lane tries a shorter one next.
-    event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
-    quiet = choose(event, 0.0, accepted)
+    event = lanes.choose(stuck, 1.0, lanes.choose(accepted, lanes.choose(attention, 1.0, 0.0), 0.0))
+    quiet = lanes.choose(event, 0.0, accepted)
     for i in range(4):
-        store_lanes(choose(quiet, end[i], y[i]), rows, START_STATE + i)
-        store_lanes(choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
-        store_lanes(end[i], rows, END_STATE + i)
-        store_lanes(end_rate[i], rows, END_RATE + i)
-    advanced = choose(quiet, h, 0.0)
-    store_lanes(h * change, rows, NEXT_STEP)
-    store_lanes(h, rows, TRIED_STEP)
-    store_lanes(load_lanes(rows, LANE_TIME) + advanced, rows, LANE_TIME)
-    store_lanes(left - advanced, rows, TIME_LEFT)
-    store_lanes(choose(quiet, 0.0, load_lanes(rows, FIRST_TRY)), rows, FIRST_TRY)
-    store_lanes(tries, rows, TRIES)
-    store_lanes(event, rows, HAS_EVENT)
-    return any_positive(event)
+        lanes.store(lanes.choose(quiet, end[i], y[i]), rows, START_STATE + i)
+        lanes.store(lanes.choose(quiet, end_rate[i], k1[i]), rows, START_RATE + i)
+        lanes.store(end[i], rows, END_STATE + i)
+        lanes.store(end_rate[i], rows, END_RATE + i)
+    advanced = lanes.choose(quiet, h, 0.0)
+    lanes.store(h * change, rows, NEXT_STEP)
+    lanes.store(h, rows, TRIED_STEP)
+    lanes.store(lanes.load(rows, LANE_TIME) + advanced, rows, LANE_TIME)
+    lanes.store(left - advanced, rows, TIME_LEFT)
+    lanes.store(lanes.choose(quiet, 0.0, lanes.load(rows, FIRST_TRY)), rows, FIRST_TRY)
+    lanes.store(tries, rows, TRIES)
+    lanes.store(event, rows, HAS_EVENT)
+    return lanes.any_positive(event)
 
 
 @kernel_part
@@ -380,7 +365,7 @@ def interpolate_step(memory: LaneMemory, lane: int, swing: float, stance: float,
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
     b = event_function(rows, END_STATE, lane, swing, stance)
-    return hermite(rows[TRIED_STEP, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
+    return events.hermite(rows[TRIED_STEP, lane], (a[0] + constant, a[1], a[2]), (b[0] + constant, b[1], b[2]))
 
 
 @kernel_part
@@ -388,13 +373,13 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Find the fraction of a lane's solver step at which the heel strikes with the swing leg ahead, or NO_CROSSING."""
     guard = interpolate_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST_TRY, lane] > 0.0
-    strike_at = first_fall(memory.finder, guard, at_start, 0.0)
+    strike_at = events.first_fall(memory.finder, guard, at_start, 0.0)
     if strike_at > 1.0:
         return NO_CROSSING
     ahead = interpolate_step(memory, lane, 1.0, -1.0, 0.0)
     # A fall through zero with the swing leg behind is a scuff, which the model ignores.
-    while strike_at <= 1.0 and evaluate_quintic(ahead, strike_at) <= 0.0:
-        strike_at = first_fall(memory.finder, guard, at_start, strike_at + 1e-12)
+    while strike_at <= 1.0 and events.evaluate_quintic(ahead, strike_at) <= 0.0:
+        strike_at = events.first_fall(memory.finder, guard, at_start, strike_at + 1e-12)
     return strike_at
 
 
@@ -409,4 +394,4 @@ def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
         return NO_CROSSING
     side = 1.0 if angle > 0.0 else -1.0
     height = interpolate_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
-    return first_fall(memory.finder, height, False, 0.0)
+    return events.first_fall(memory.finder, height, False, 0.0)

@@ -10,16 +10,7 @@ from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.hybrid.walk_record import Array
 from walkerlab.physics.kernels import kernel
 from walkerlab.physics.mechanics import rigid_model
-from walkerlab.physics.mechanics.rigid_model import (
-    BENT,
-    STANCE,
-    STRAIGHT,
-    SWING,
-    Mode,
-    RigidModel,
-    compute_in_turns,
-    ground_reaction,
-)
+from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
@@ -46,7 +37,9 @@ def fill_energies(walker: RigidModel, states: Any, out: Any) -> None:
 @kernel
 def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None:
     for i in range(states.shape[0]):
-        out[i, 0], out[i, 1] = ground_reaction(Mode(walker, BENT if bent[i] else STRAIGHT), states[i])
+        out[i, 0], out[i, 1] = rigid_model.ground_reaction(
+            Mode(walker, rigid_model.BENT if bent[i] else rigid_model.STRAIGHT), states[i]
+        )
 
 
 @dataclass(frozen=True)
@@ -68,7 +61,7 @@ class FootholdsOfWalk(NamedTuple):
 
 
 def footholds_of(walk: RigidWalkResult) -> FootholdsOfWalk:
-    set_down = np.append(walk.start[STANCE], walk.after[:, STANCE])
+    set_down = np.append(walk.start[rigid_model.STANCE], walk.after[:, rigid_model.STANCE])
     return FootholdsOfWalk(np.append(0.0, walk.touch_along_m), walk.ground_m, set_down)
 
 
@@ -86,19 +79,20 @@ def places(
 
     def points(model: RigidModel, angle: Array, step: NDArray[np.int64]) -> Array:
         psi = angle + model.slope
-        rolled = -model.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
+        rolled = -model.radius * (angle[:, rigid_model.STANCE] - footholds.set_down_rad[step])
         contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))
         centre = contact + np.array([0.0, model.radius])
-        hip = centre + rotate_levers(psi[:, [STANCE]], [model.hip_x], [model.hip_y])
+        hip = centre + rotate_levers(psi[:, [rigid_model.STANCE]], [model.hip_x], [model.hip_y])
         foot = centre + rotate_levers(psi, model.foot_x, model.foot_y) - [0.0, model.swing_radius]
         # `compute_in_turns` passes either even or odd steps. In odd steps leg 2 swings.
         by_role = knees_m[::-1] if step.size and step[0] % 2 else knees_m
         knees = [
-            hip + rotate_levers(psi[:, [leg]], [x], [y]) for leg, (x, y) in zip((SWING, STANCE), by_role, strict=False)
+            hip + rotate_levers(psi[:, [leg]], [x], [y])
+            for leg, (x, y) in zip((rigid_model.SWING, rigid_model.STANCE), by_role, strict=False)
         ]
         return np.stack((contact, hip, foot, *knees), axis=1)
 
-    at = compute_in_turns(walker, step, points, angle, step)
+    at = rigid_model.compute_in_turns(walker, step, points, angle, step)
     return Places(at[:, 0], at[:, 1], at[:, 2], at[:, 3:] if knees_m else None)
 
 

@@ -11,42 +11,11 @@ import numpy as np
 from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.rigid_record import Observer, observe, observe_start, observe_strike
 from walkerlab.physics.kernels import kernel, kernel_part, vector
+from walkerlab.physics.mechanics import rigid_model as rigid
 from walkerlab.physics.mechanics.impact import strike
-from walkerlab.physics.mechanics.rigid_model import (
-    AT_STRIKE,
-    BENT,
-    NO_SHANK,
-    STANCE,
-    STRAIGHT,
-    SWING,
-    Mode,
-    RigidModel,
-    feet_on_slope,
-    hip_height,
-    swing_foot,
-    swing_foot_motion,
-)
-from walkerlab.physics.solvers.events import (
-    FALLING,
-    NO_CROSSING,
-    RISING,
-    CrossingFinder,
-    first_crossing,
-    shift_column,
-    value_at,
-)
-from walkerlab.physics.solvers.stepping import (
-    H_NEXT,
-    OUT_OF_BUDGET,
-    STEP_DONE,
-    T_OLD,
-    T,
-    advance,
-    begin,
-    prepare_dense,
-    rewind,
-    sample,
-)
+from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
+from walkerlab.physics.solvers import events, stepping
+from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder
 from walkerlab.physics.solvers.system import derivative
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
@@ -64,7 +33,7 @@ EVENTS = 5
 @kernel_part
 def is_bent(system: Mode) -> bool:
     """Whether the swing knee is free, so that a knee strike ends the phase."""
-    return system.phase == BENT and system.model.shank != NO_SHANK
+    return system.phase == rigid.BENT and system.model.shank != rigid.NO_SHANK
 
 
 @kernel_part
@@ -78,7 +47,7 @@ def knee_angle(model: RigidModel, y: Any, first: int) -> float:
 @kernel_part
 def hip_above_fall(model: RigidModel, y: Any) -> float:
     """Compute the height (m) of the hip above the limit below which the walker has fallen."""
-    return hip_height(model, y) - endings.FALLEN_HIP * model.leg_length
+    return rigid.hip_height(model, y) - endings.FALLEN_HIP * model.leg_length
 
 
 @kernel_part
@@ -89,7 +58,7 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
     model = system.model
     old = method.y_old
     y = method.y
-    h = method.clock[T] - method.clock[T_OLD]
+    h = method.clock[stepping.T] - method.clock[stepping.T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
     n = len(model.arm_x)
@@ -115,12 +84,17 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
     turn  (n,) angular velocities, for rates of change, or a change of the angles, for directional derivatives
     """
     model = system.model
-    swing = turn[SWING]
-    stance = turn[STANCE]
+    swing = turn[rigid.SWING]
+    stance = turn[rigid.STANCE]
     if is_bent(system) or system.rise != 0.0 or not model.alike:
-        height, ahead, upward, apart = swing_foot_motion(model, y, turn)
+        height, ahead, upward, apart = rigid.swing_foot_motion(model, y, turn)
         return height - system.rise, ahead, upward, apart
-    return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
+    return (
+        rigid.feet_on_slope(model, y[rigid.SWING], y[rigid.STANCE]),
+        y[rigid.SWING] - y[rigid.STANCE],
+        swing + stance,
+        swing - stance,
+    )
 
 
 @kernel_part
@@ -154,15 +128,15 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
-    strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
+    strike = events.first_crossing(finder, HEEL_STRIKE, events.FALLING, 0.0, on_ground)
     # A foot that comes down behind the stance foot scuffs, which the model ignores.
-    while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
-        strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
-    fall = first_crossing(finder, HIP_FALL, FALLING, 0.0, False)
+    while strike <= 1.0 and events.value_at(finder, AHEAD, strike) <= 0.0:
+        strike = events.first_crossing(finder, HEEL_STRIKE, events.FALLING, strike + 1e-12, on_ground)
+    fall = events.first_crossing(finder, HIP_FALL, events.FALLING, 0.0, False)
     knee_strike = NO_CROSSING
     if is_bent(system):
         straight = at_start and abs(finder.values[KNEE, 0]) < endings.STRAIGHT_KNEE
-        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if straight else 0.0, straight)
+        knee_strike = events.first_crossing(finder, KNEE, events.RISING, SEARCH_START if straight else 0.0, straight)
     return strike, fall, knee_strike
 
 
@@ -180,22 +154,26 @@ def take_step(
     model = walker[step % walker.size]
     following = walker[(step + 1) % walker.size]
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
-    phase = BENT if model.shank != NO_SHANK and strikes.knee_time[step] >= 0.0 else STRAIGHT
+    phase = rigid.BENT if model.shank != rigid.NO_SHANK and strikes.knee_time[step] >= 0.0 else rigid.STRAIGHT
     behind = -strikes.rise[step]
     rise = strikes.rise[step + 1]
     while True:
         system = Mode(model, phase, behind, rise)
         status = swing_phase(method, system, finder, observer, t, y, latest, step)
         if status != endings.WALKED and status != endings.KNEE_STRUCK:
-            return status, method.clock[T]
-        if status == endings.WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
-            return endings.FELL, method.clock[T]
+            return status, method.clock[stepping.T]
+        if (
+            status == endings.WALKED
+            and strikes.nearest > 0.0
+            and rigid.swing_foot(model, method.y)[1] < strikes.nearest
+        ):
+            return endings.FELL, method.clock[stepping.T]
         t = pass_event(method, system, following, y, strikes, step)
         observe_strike(observer, system, following, status == endings.WALKED, method.y, y)
         if status == endings.WALKED:
             return endings.WALKED, t
         strikes.knee_time[step] = t
-        phase = STRAIGHT
+        phase = rigid.STRAIGHT
 
 
 @kernel_part
@@ -208,24 +186,24 @@ def swing_phase(
     coming = False
     # After a knee strike the swing foot is in the air and the knee is no longer watched, so no event function starts at
     # zero.
-    at_start = is_bent(system) or system.model.shank == NO_SHANK
-    begin(method, system, t, y, method.clock[H_NEXT])
+    at_start = is_bent(system) or system.model.shank == rigid.NO_SHANK
+    stepping.begin(method, system, t, y, method.clock[stepping.H_NEXT])
     observe_start(observer, system, y)
-    while method.clock[T] < limit:
-        status = advance(method, system, limit)
-        if status != STEP_DONE:
-            return endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED
+    while method.clock[stepping.T] < limit:
+        status = stepping.advance(method, system, limit)
+        if status != stepping.STEP_DONE:
+            return endings.BUDGET_EXHAUSTED if status == stepping.OUT_OF_BUDGET else endings.SOLVER_FAILED
         # The interval up to a located event was searched and observed before the solver step was rewound.
         if coming:
             continue
         near = may_end(system, method, at_start)
         if near or observer.watching:
-            prepare_dense(method, system)
+            stepping.prepare_dense(method, system)
         strike = NO_CROSSING
         fall = NO_CROSSING
         knee_strike = NO_CROSSING
         if near:
-            sample(method, system, finder.nodes, finder.states)
+            stepping.sample(method, system, finder.nodes, finder.states)
             strike, fall, knee_strike = events_in_step(system, finder, at_start)
         if observer.watching:
             observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
@@ -236,8 +214,10 @@ def swing_phase(
             return endings.BENT_KNEE
         if min(strike, knee_strike) <= 1.0:
             coming = True
-            limit = method.clock[T_OLD] + min(strike, knee_strike) * (method.clock[T] - method.clock[T_OLD])
-            rewind(method, system)
+            limit = method.clock[stepping.T_OLD] + min(strike, knee_strike) * (
+                method.clock[stepping.T] - method.clock[stepping.T_OLD]
+            )
+            stepping.rewind(method, system)
         at_start = False
     if not coming:
         return endings.NO_HEEL_STRIKE
@@ -270,14 +250,14 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
     f = vector(model.zero_state)
     for i in range(2 * n):
         before[i] = y[i]
-    derivative(system, method.clock[T], before, f)
+    derivative(system, method.clock[stepping.T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
     # The solver step ends at the event up to the error of its dense output, so a step of first order bridges the rest.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]
         before[i] = y[i]
-    t = method.clock[T] + wait
+    t = method.clock[stepping.T] + wait
     if len(y) > 2 * n:
         derivative(system, t, before, f)
         _, rate = event_value(system, y, y[n : 2 * n])
@@ -287,18 +267,18 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
             wait = -change / rate
             lift = strikes.lift[step + 1, column - 1]
             if lift != 0.0 and not knee:
-                _, _, upward, _ = swing_foot_motion(model, y, y[n : 2 * n])
+                _, _, upward, _ = rigid.swing_foot_motion(model, y, y[n : 2 * n])
                 # A foothold that rises meets the foot earlier: `upward` is negative.
                 wait += lift / upward
             waits[step, column - 1] = wait
-            shift_column(y, at, f, wait)
-    strike(model, model if knee else following, STRAIGHT if knee else AT_STRIKE, y, new)
+            events.shift_column(y, at, f, wait)
+    strike(model, model if knee else following, rigid.STRAIGHT if knee else rigid.AT_STRIKE, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
-        derivative(Mode(model, STRAIGHT, system.behind, system.rise), t, before, f)
+        derivative(Mode(model, rigid.STRAIGHT, system.behind, system.rise), t, before, f)
         for column in range(1, len(y) // (2 * n)):
-            shift_column(new, 2 * n * column, f, -waits[step, column - 1])
+            events.shift_column(new, 2 * n * column, f, -waits[step, column - 1])
     return t
 
 

@@ -3,14 +3,25 @@
 A law is a type registered with `hinge_torque` and `hinge_energy`. Its resistance turns the first body back and the
 second one forward; it dissipates the power (resistance - elastic part) times the rate.
 
-Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of a
-SpringDamper. The first row is the hip; the others are the knees that can bend: the swing knee in the rigid model, both
-knees on compliant ground, where each also has a stop.
+Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of its law, a
+SpringDamper or a law derived from it. The first row is the hip; the others are the knees that can bend: the swing knee
+in the rigid model, both knees on compliant ground, where each also has a stop. All rows have the same law. The record
+type of a model names it, as it fixes the number of bodies, so each kernel is compiled for one law.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from functools import cache
+from typing import Any, Final, NamedTuple
 
-from walkerlab.physics.kernels import dispatch_by_type_or_default, forced_inline, kernel_part
+from walkerlab.physics.kernels import (
+    ALWAYS_INLINE_FLAGS,
+    LawKind,
+    classes_named_by,
+    compile_as,
+    dispatch_by_type_or_default,
+    forced_inline,
+    kernel_part,
+)
 
 
 @dispatch_by_type_or_default
@@ -43,11 +54,16 @@ def hinge_energy(law: Any, angle: float) -> float:
 
 
 class SpringDamper(NamedTuple):
-    """Spring that is relaxed at zero angle, damper, and constant torque."""
+    """Spring that is relaxed at zero angle, damper, and constant torque. Other laws are classes derived from it."""
 
     stiffness: float  # N m/rad
-    damping: float  # N m s/rad
-    torque: float  # N m, turns the first body forward and the second back
+    damping: float  # N m s/rad; a law dissipates energy only if it is not 0
+    torque: float  # N m, turns the first body forward and the second back; all energy that a law supplies is its work
+
+    @classmethod
+    def units(cls, energy: float, time: float) -> "SpringDamper":
+        """Return the units of the parameters, made of those of energy and time. Angles have none."""
+        return cls(energy, energy * time, energy)
 
 
 @hinge_torque.case(SpringDamper, forced_inline=True)
@@ -61,16 +77,30 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
+HINGE_LAWS: Final = LawKind("hinge_law", {"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy))
+"""Hinge laws by their names in `walker.hip.hinge_law` of a config."""
 LAW_NUMBERS = len(SpringDamper._fields)
 DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))
 HIP_ROW = 0  # row of the hinge between the legs
 HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
 
 
-@forced_inline
+def law_named_by(fields: Iterable[str]) -> Any:
+    """Return the hinge law that a record type with these fields names."""
+    return next(classes_named_by(fields), SpringDamper)
+
+
+@cache
+def law_reader(law: Any) -> Callable[[Any, int], SpringDamper]:
+    return lambda model, row: law(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
+
+
 def hinge_law(model: Any, row: int) -> SpringDamper:
-    """Return the spring, damper and constant torque at a hinge."""
-    return SpringDamper(model.laws[row, 0], model.laws[row, 1], model.laws[row, 2])
+    """Return the law at a hinge: spring, damper and constant torque."""
+    return law_reader(law_named_by(model.dtype.names))(model, row)
+
+
+compile_as(hinge_law, lambda model, _: (law_reader(law_named_by(model.fields)), ALWAYS_INLINE_FLAGS))
 
 
 @forced_inline

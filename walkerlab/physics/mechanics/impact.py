@@ -14,17 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.rigid_model import (
-    AT_STRIKE,
-    BENT,
-    NO_SHANK,
-    STANCE,
-    STRAIGHT,
-    SWING,
-    RigidModel,
-    equations,
-    hip_height,
-)
+from walkerlab.physics.mechanics import rigid_model as rigid
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.mechanics.tree import add_inertia, factor_linked, projections, sines_cosines, solve_linked
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats
@@ -40,7 +31,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     """
     # E[phase] makes bodies follow others, such as a locked shank its thigh (see tree.py).
     like = model.arm_x
-    other_foot = phase == AT_STRIKE
+    other_foot = phase == rigid.AT_STRIKE
     n = len(like)
     R = model.radius
     R_before = before.radius
@@ -60,7 +51,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
     # Velocity of the new stance foot's centre, along the slope and normal to it. The old foot's centre moves at -R
     # omega; at a heel strike the levers to the other foot are added.
-    along = -R_before * y[n + STANCE]
+    along = -R_before * y[n + rigid.STANCE]
     upward = 0.0
     if other_foot:
         for l in range(n):
@@ -70,7 +61,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         body = model.roles[k] if other_foot else k
         new[k], new[n + k] = y[body], y[n + body]
     # p is scratch here: finite torques have no part in an impact.
-    equations(model, new, s, c, F, U, M, p)
+    rigid.equations(model, new, s, c, F, U, M, p)
     for k in range(n):
         for l in range(n):
             factors[k, l] = M[k, l]
@@ -83,10 +74,10 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     for k in range(n):
         jump[k] = p[k] - new[n + k]
         new[n + k] = p[k]
-    jump_along = -R * p[STANCE] - along
+    jump_along = -R * p[rigid.STANCE] - along
     jump_upward = -upward
     for at in range(2 * n, len(y), 2 * n):
-        along = -R_before * y[at + n + STANCE]
+        along = -R_before * y[at + n + rigid.STANCE]
         upward = 0.0
         if other_foot:
             # The root's velocity above, differentiated with dF/dtheta = -U and dU/dtheta = F.
@@ -99,7 +90,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         twist = 0.0
         if pushed:
             push = push_off(model, new)
-            twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
+            twist = push.by_trailing * new[at + rigid.SWING] + push.by_leading * new[at + rigid.STANCE]
         turn = new[at : at + n]
         rate = new[at + n : at + 2 * n]
         # Z^T M (u+ - u) = 0 also holds for neighbouring angles. Its change contains Z^T dM (u+ - u), while Z is
@@ -162,8 +153,8 @@ class PushOffImpulse(NamedTuple):
 @kernel_part
 def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     """Compute the push-off at a heel strike from the state `new` just after it."""
-    s_t, c_t = sine_cosine(new[SWING] + model.slope)
-    s_l, c_l = sine_cosine(new[STANCE] + model.slope)
+    s_t, c_t = sine_cosine(new[rigid.SWING] + model.slope)
+    s_l, c_l = sine_cosine(new[rigid.STANCE] + model.slope)
     R_t = model.swing_radius
     R_l = model.radius
     hip_x = model.swing_hip_x
@@ -192,18 +183,18 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     Eliminating the angular velocities from M leaves the apparent mass at the hip, m - C^T I^-1 C, with first moments C
     and inertia I about the hip. Source: Kuo (2002); with massless legs the work is P^2 / (2 m).
     """
-    n, E = len(model.arm_x), model.E[STRAIGHT]
+    n, E = len(model.arm_x), model.E[rigid.STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
     # the trailing leg carries no other body; its constants about the hip are those with which it swings next
     following = model.exchanged
-    leg = [SWING] if following.shank == NO_SHANK else [SWING, int(following.shank)]
+    leg = [rigid.SWING] if following.shank == rigid.NO_SHANK else [rigid.SWING, int(following.shank)]
     inertia_leg = following.A[np.ix_(leg, leg)].sum()
     moment_x = following.arm_x[leg].sum()
     moment_y = following.arm_y[leg].sum()
     for pairs in (A, B):
-        pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
-    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = inertia_leg, moment_x, moment_y
+        pairs[rigid.STANCE, :], pairs[:, rigid.STANCE] = 0.0, 0.0
+    A[rigid.STANCE, rigid.STANCE], arm_x[rigid.STANCE], arm_y[rigid.STANCE] = inertia_leg, moment_x, moment_y
     psi = before[:, :n] + model.slope
     s = np.sin(psi)
     c = np.cos(psi)
@@ -211,8 +202,8 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     inertia = Z.T @ (A * np.cos(turned) + B * np.sin(turned)) @ Z
     moments = Z.T @ np.stack((-s * arm_x - c * arm_y, c * arm_x - s * arm_y), axis=2)
     apparent = model.mass * np.eye(2) - moments.transpose(0, 2, 1) @ np.linalg.solve(inertia, moments)
-    s_t = s[:, STANCE]
-    c_t = c[:, STANCE]
+    s_t = s[:, rigid.STANCE]
+    c_t = c[:, rigid.STANCE]
     to_hip = np.stack((c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + model.radius), 1)
     impulse = following.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
     return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
@@ -223,14 +214,14 @@ def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float
     # The new stance foot stays at rest. The trailing knee is already released and moves freely.
     n = len(model.arm_x)
     new = np.array(y, float)
-    E = model.E[BENT if model.kneed else STRAIGHT]
+    E = model.E[rigid.BENT if model.kneed else rigid.STRAIGHT]
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
-    equations(model, new, s, c, F, U, M, p)
+    rigid.equations(model, new, s, c, F, U, M, p)
     # `equations` has filled p with torques, which do nothing in an instant.
     p[:] = 0.0
     # A forward impulse above the foothold turns the stance leg clockwise.
-    p[STANCE] = -impulse * hip_height(model, new)
+    p[rigid.STANCE] = -impulse * rigid.hip_height(model, new)
     factor_linked(E, n, M)
     solve_linked(E, n, M, p)
     new[n:] += p
@@ -260,16 +251,16 @@ def project(
     # M is M' of rigid_model.py and includes the root's rolling velocity -R omega; `sliding` is `along` minus that.
     M, F, U = constraints.M, constraints.F, constraints.U
     n, R = len(model.arm_x), model.radius
-    sliding = along + R * omega[STANCE]
+    sliding = along + R * omega[rigid.STANCE]
     for k in range(n):
         total = upward * F[k] - sliding * U[k]
         for l in range(n):
             total += M[k, l] * omega[l]
         p[k] = total
-    p[STANCE] -= R * model.mass * sliding
+    p[rigid.STANCE] -= R * model.mass * sliding
     for k in range(n):
         p[k] -= turned[k]
-    p[STANCE] += twist
+    p[rigid.STANCE] += twist
     solve_linked(constraints.E, n, constraints.factors, p)
 
 
@@ -289,4 +280,4 @@ def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, 
             total += (model.B[k, l] * cos_d - model.A[k, l] * sin_d) * (turn[l] - turn_k) * jump[l]
         p[k] = total
         pulled += F[k] * turn_k * jump[k]
-    p[STANCE] += model.radius * pulled
+    p[rigid.STANCE] += model.radius * pulled

@@ -6,16 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from walkerlab.physics.mechanics import parts
-from walkerlab.physics.mechanics.rigid_model import (
-    NO_SHANK,
-    STANCE,
-    SWING,
-    RigidModel,
-    change_slope,
-    new_rigid_model,
-    pair,
-)
+from walkerlab.physics.mechanics import parts, rigid_model
+from walkerlab.physics.mechanics.hinges import SpringDamper
+from walkerlab.physics.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel
 from walkerlab.physics.solvers.system import Floats
 
 SYMMETRY_TOLERANCE = 1e-12  # relative difference up to which two legs count as equal
@@ -36,30 +29,34 @@ def rigid_on_slope(
     assembly: parts.Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True
 ) -> RigidModel:
     """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `rigid_on_level_ground`."""
-    return change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
+    return rigid_model.change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
-def rigid_on_level_ground(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def rigid_on_level_ground(
+    assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper] = SpringDamper
+) -> RigidModel:
     """Build the rigid model of an assembly, which is a pair of models if the legs differ. Gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
     Raises ValueError, with a message for the user, if the parts are not a walker with two legs.
     """
     check_legs(assembly)
-    first = swinging_first(assembly, gravity, knee_locked_at_strike)
+    first = swinging_first(assembly, gravity, knee_locked_at_strike, law)
     if have_equal_legs(assembly):
         return first
     exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
-    second = swinging_first(exchanged, gravity, knee_locked_at_strike)
+    second = swinging_first(exchanged, gravity, knee_locked_at_strike, law)
     if not knee_locked_at_strike and first.coordinates != second.coordinates:
         raise ValueError(
             "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
         )
     # Lengths and falls are scaled by the length of leg 1. In the second model leg 1 is the stance leg.
-    return pair(first.changed(leg_length=second.leg_length), second)
+    return rigid_model.pair(first.changed(leg_length=second.leg_length), second)
 
 
-def swinging_first(assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def swinging_first(
+    assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper]
+) -> RigidModel:
     """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
     hip = find_hip(assembly)
     groups = group_bodies(assembly)
@@ -85,8 +82,9 @@ def swinging_first(assembly: parts.Assembly, gravity: float, knee_locked_at_stri
     # in the order BENT, STRAIGHT, AT_STRIKE
     reductions = [parts.reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
     shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
-    return new_rigid_model(
+    return rigid_model.new_rigid_model(
         n,
+        law,
         **parts.tree_about(assembly, root).merge_bodies(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],

@@ -16,40 +16,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector, zeros
-from walkerlab.physics.mechanics import tree
-from walkerlab.physics.mechanics.hinges import (
-    DAMPING,
-    HIP_ROW,
-    HingeTorque,
-    add_hinge_gradients,
-    add_hinge_torque,
-    hinge_energy,
-    hinge_law,
-    hinge_torque,
-    is_sprung,
-    legs_apart,
-)
-from walkerlab.physics.mechanics.tree import (
-    add_gravity,
-    add_gravity_gradient,
-    add_inertia,
-    add_inertia_gradients,
-    expand,
-    factor_linked,
-    lever_motion,
-    projections,
-    sines_cosines,
-    solve_linked,
-)
+from walkerlab.physics.mechanics import hinges, tree
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
-SWING = 0
-STANCE = 1
+SWING, STANCE = range(2)
 # indices into E: swing knee bent, swing leg straight, heel strike
-BENT = 0
-STRAIGHT = 1
-AT_STRIKE = 2
+BENT, STRAIGHT, AT_STRIKE = range(3)
 NO_SHANK = -1
 
 
@@ -98,7 +71,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     @property
     def damped_knees(self) -> bool:
         """Whether a knee has a damper."""
-        laws = [model.laws[HIP_ROW + 1 :, DAMPING] for model in (self, self.exchanged)]
+        laws = [model.laws[hinges.HIP_ROW + 1 :, hinges.DAMPING] for model in (self, self.exchanged)]
         return bool(np.any(laws))
 
     @property
@@ -174,15 +147,15 @@ def compute_in_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> 
     return merged
 
 
-def new_rigid_model(n: int, **fields: Any) -> RigidModel:
-    """Create a rigid model of n bodies with the given fields. All others are zero."""
+def new_rigid_model(n: int, law: type[hinges.SpringDamper], **fields: Any) -> RigidModel:
+    """Create a rigid model of n bodies with a hinge law and the given fields. All others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
         **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),
         "section": (n + 1,),
         "zero_state": (2 * n,),
     }
-    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes))
+    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes, law))
     model: RigidModel = blank[()]
     return model.changed(**fields)
 
@@ -214,15 +187,15 @@ def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any,
     """Write M' (n, n) in kg m^2 into M, r' (n,) in N m into r, and their terms into s, c, F and U."""
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
-    sines_cosines(model, n, y, s, c)
-    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    tree.sines_cosines(model, n, y, s, c)
+    tree.projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
         r[k] = 0.0
-    add_gravity(model, n, F, U, r)
-    add_inertia(model, n, s, c, omega, M, r)
+    tree.add_gravity(model, n, F, U, r)
+    tree.add_inertia(model, n, s, c, omega, M, r)
     for row in range(len(model.hinges)):
-        if is_sprung(model, row):
-            add_hinge_torque(torque_at(model, row, y), model.hinges[row, 0], model.hinges[row, 1], r)
+        if hinges.is_sprung(model, row):
+            hinges.add_hinge_torque(torque_at(model, row, y), model.hinges[row, 0], model.hinges[row, 1], r)
     add_unpaired_torque(model, s, c, omega, r)
     if R != 0.0:
         pulled = model.mass * model.gravity_along
@@ -235,15 +208,15 @@ def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any,
 
 
 @forced_inline
-def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
+def torque_at(model: RigidModel, row: int, y: Any) -> hinges.HingeTorque:
     """Compute the torque of the spring, damper and drive at a hinge."""
     n = len(model.arm_x)
     body = model.hinges[row, 0]
     other = model.hinges[row, 1]
-    return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
+    return hinges.hinge_torque(hinges.hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
 
 
-@legs_apart.case(Mode)
+@hinges.legs_apart.case(Mode)
 def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
     """Return the angle between the legs' uppermost bodies (rad), and its rate (rad/s)."""
     n = len(system.model.arm_x)
@@ -284,8 +257,8 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     alpha = vector(like)
     M = matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(E, n, M)
-    solve_linked(E, n, M, alpha)
+    tree.factor_linked(E, n, M)
+    tree.solve_linked(E, n, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
@@ -299,7 +272,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 for l in range(n):
                     total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
                 alpha[k] = total
-            solve_linked(E, n, M, alpha)
+            tree.solve_linked(E, n, M, alpha)
             for k in range(n):
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
 
@@ -311,18 +284,18 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
     omega = y[n : 2 * n]
     F = vector(model.arm_x)
     U = vector(model.arm_x)
-    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    tree.projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
         for l in range(n):
             by_angle[k, l], by_rate[k, l] = 0.0, 0.0
         # From M'_ks = M_ks + R U_k, with dU/dtheta = F.
         by_angle[k, k] = -R * F[k] * alpha[STANCE]
-    add_gravity_gradient(model, n, F, U, by_angle)
-    add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
+    tree.add_gravity_gradient(model, n, F, U, by_angle)
+    tree.add_inertia_gradients(model, n, s, c, omega, alpha, by_angle, by_rate)
     for row in range(len(model.hinges)):
-        if is_sprung(model, row):
+        if hinges.is_sprung(model, row):
             now = torque_at(model, row, y)
-            add_hinge_gradients(now, model.hinges[row, 0], model.hinges[row, 1], by_angle, by_rate)
+            hinges.add_hinge_gradients(now, model.hinges[row, 0], model.hinges[row, 1], by_angle, by_rate)
     add_unpaired_gradients(model, s, c, omega, by_angle, by_rate)
     if R != 0.0:
         for l in range(n):
@@ -346,14 +319,14 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     by_angle = matrix(like)
     by_rate = matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(E, n, M)
-    solve_linked(E, n, M, alpha)
+    tree.factor_linked(E, n, M)
+    tree.solve_linked(E, n, M, alpha)
     torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0
             alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
-        solve_linked(E, n, M, alpha)
+        tree.solve_linked(E, n, M, alpha)
         for k in range(n):
             J[n + k, j] = alpha[k]
 
@@ -365,8 +338,8 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     n = len(model.arm_x)
     s, c, F, U = vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x)
     f = vector(model.zero_state)
-    sines_cosines(model, n, y, s, c)
-    projections(model.arm_x, model.arm_y, n, s, c, F, U)
+    tree.sines_cosines(model, n, y, s, c)
+    tree.projections(model.arm_x, model.arm_y, n, s, c, F, U)
     derivative(system, 0.0, y, f)
     # Newton's law for the centre of mass, which moves with the rolling foot's centre and with the first moments.
     along = -model.mass * (model.radius * f[n + STANCE] + model.gravity_along)
@@ -383,8 +356,8 @@ def momentum(model: RigidModel, y: Any) -> tuple[float, float]:
     """Compute the walker's linear momentum (kg m/s), along the slope and normal to it."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
-    sines_cosines(model, n, y, s, c)
-    _, _, along, normal = lever_motion(model.arm_x, model.arm_y, n, s, c, y[n : 2 * n])
+    tree.sines_cosines(model, n, y, s, c)
+    _, _, along, normal = tree.lever_motion(model.arm_x, model.arm_y, n, s, c, y[n : 2 * n])
     return along - model.mass * model.radius * y[n + STANCE], normal
 
 
@@ -400,7 +373,9 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
     for row in range(len(model.hinges)):
-        potential += hinge_energy(hinge_law(model, row), y[model.hinges[row, 0]] - y[model.hinges[row, 1]])
+        potential += hinges.hinge_energy(
+            hinges.hinge_law(model, row), y[model.hinges[row, 0]] - y[model.hinges[row, 1]]
+        )
     return tree.kinetic_energy(n, M, y[n : 2 * n]), potential
 
 
@@ -423,8 +398,8 @@ def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, floa
     """Compute the results of `swing_foot` and their changes due to `turn` (n,): m for angles (rad), m/s for rates."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
-    sines_cosines(model, n, y, s, c)
-    ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, turn)
+    tree.sines_cosines(model, n, y, s, c)
+    ahead, height, apart, upward = tree.lever_motion(model.foot_x, model.foot_y, n, s, c, turn)
     return height + (model.radius - model.swing_radius), ahead, upward, apart
 
 
@@ -479,5 +454,5 @@ def kinetic_energy(model: RigidModel, y: Any) -> float:
 def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
     """Return a copy of `values` (n,) in which each follower's value is computed from those of the bodies it follows."""
     every = np.array(values, float)
-    expand(model.E[phase], every.size, every)
+    tree.expand(model.E[phase], every.size, every)
     return every

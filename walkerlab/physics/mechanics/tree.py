@@ -29,7 +29,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from walkerlab.physics.kernels import forced_inline
-from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS, TORQUE
+from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS, TORQUE, SpringDamper
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers
 
@@ -46,14 +46,18 @@ def fast_fields(kind: R) -> R:
     return kind
 
 
-def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
-    """Create the NumPy type of a structured scalar with the fields of a class and its bases, eight bytes per number."""
+def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]], law: type[SpringDamper] = SpringDamper) -> Any:
+    """Create the NumPy type of a structured scalar with the fields of a class and its bases, eight bytes per number.
+
+    law  hinge law of a Mechanism; an added field without meaning names any but SpringDamper
+    """
+    marks = [] if law is SpringDamper else [(f"{law.__module__}/{law.__qualname__}", np.int64)]
     fields = [
         (name, np.int64 if of in (Integers, int, bool) else np.float64, shapes.get(name, ()))
         for each in (*kind.__bases__, kind)
         for name, of in get_annotations(each).items()
     ]
-    return np.dtype((kind, fields))
+    return np.dtype((kind, fields + marks))
 
 
 def new_record(kind: Any, **fields: Any) -> Any:
@@ -74,7 +78,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
     arm_y: Floats
     E: Floats  # (phases, n, n) reductions; a body that follows others has zero on the diagonal
     hinges: Integers  # (rows, 2) bodies at each hinge; its resistance turns the first back and the second forward
-    laws: Floats  # (rows, LAW_NUMBERS) parameters of the SpringDamper at each hinge
+    laws: Floats  # (rows, LAW_NUMBERS) parameters of the hinge law at each hinge
     push_off: float  # N s, impulse along the trailing leg: instantaneous, or a pulse that starts at the touch
     mass: float  # kg
     gravity_along: float  # m/s^2, downhill
@@ -83,7 +87,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def hip(self) -> Floats:
-        """Parameters (LAW_NUMBERS,) of the SpringDamper between the legs."""
+        """Parameters (LAW_NUMBERS,) of the hinge law between the legs."""
         parameters: Floats = self.laws[HIP_ROW]
         return parameters
 

@@ -127,7 +127,7 @@ def sweep_attractor(
 
 
 def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) -> Attractor | Outcome:
-    flipping = min(gait.multipliers.real)
+    flipping = min(gait.multipliers, key=lambda multiplier: float(multiplier.real))
     aside = GAIT_OFFSET * np.max(np.abs(gait.z)) * eigenvector(gait.DP, flipping)
     return settle(step_map, gait.z + aside, gait.value, transient, steps)
 

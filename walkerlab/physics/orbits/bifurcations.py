@@ -112,10 +112,12 @@ class FlipForm:
         return math.sqrt(0.25 * FIRST_MULTIPLIER_DROP / abs(self.cubic))
 
 
-def eigenvector(A: Floats, value: float) -> Floats:
-    _, _, rows = np.linalg.svd(A - value * np.eye(A.shape[0]))
-    # The right singular vector of the smallest singular value spans the kernel.
-    return np.asarray(rows[-1])
+def eigenvector(A: Floats, value: complex) -> Floats:
+    """Return the unit eigenvector of a real eigenvalue, or a direction in the plane of a complex pair."""
+    _, _, rows = np.linalg.svd(A - (value if value.imag else value.real) * np.eye(A.shape[0]))
+    # The right singular vector of the smallest singular value spans the kernel. The real and the imaginary part of a
+    # complex one span the pair's plane, but its phase is arbitrary, so one of them may vanish.
+    return max(rows[-1].real, rows[-1].imag, key=lambda part: float(np.linalg.norm(part)))
 
 
 def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:

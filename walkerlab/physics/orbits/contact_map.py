@@ -21,35 +21,18 @@ from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import LOSS_ENTRIES
+from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
-from walkerlab.physics.ground.walker import (
-    ContactWalker,
-    OnGround,
-    feet_motion,
-    place_on_ground,
-    sines_cosines,
-    to_form,
-    to_full,
-)
+from walkerlab.physics.ground.walker import ContactWalker, OnGround
 from walkerlab.physics.hybrid.contact_jumps import state_rate
 from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_observer, present_walker, walk_on
 from walkerlab.physics.hybrid.contact_state import PASSING, JudgedGround, WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
 from walkerlab.physics.mechanics.tree import add_inertia, factor_linked, solve_linked
-from walkerlab.physics.orbits.step_map import (
-    CACHE_SIZE,
-    Cycle,
-    DisturbedWalk,
-    MappedStep,
-    Monitor,
-    StepMap,
-    Stepper,
-    failed_step,
-    valid,
-    walk_steps,
-)
+from walkerlab.physics.orbits import step_map as maps
+from walkerlab.physics.orbits.step_map import Cycle, DisturbedWalk, MappedStep, Monitor, StepMap, Stepper
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
@@ -71,6 +54,16 @@ class SectionStep(MappedStep):
     dissipated_J: Floats  # (5,) losses to damping, friction, pad edges, knee strikes and knee stops
     driven: DrivenWork
     work: NDArray[np.int64]  # counts of right-hand-side evaluations, accepted steps, rejected steps and Jacobians
+
+
+@dataclass(frozen=True)
+class WalkerOnGround:
+    walker: ContactWalker
+    ground: JudgedGround
+
+
+def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
+    return replace(site, ground=site.ground._replace(terrain=terrain))
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
@@ -143,7 +136,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
     """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
-    foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
+    foot = forms.feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
     depth = walker.normal.resting_foot(walker.mass * walker.gravity_down, walker.mass).depth
     along_rate = 1 + len(angled_bodies(walker, stance))
     moved = z.copy()
@@ -184,8 +177,7 @@ def stance_of(swing: int) -> int:
 
 
 def step_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
+    site: WalkerOnGround,
     tolerances: Tolerances,
     z: Floats,
     pitch_m: float,
@@ -195,14 +187,14 @@ def step_from_section(
     """Walk from section to section on pads of pitch `pitch_m`. The outcome is REJECTED if a push-off lasts beyond the
     section.
     """
-    laid = ground
+    walker = site.walker
     start = state_on_section(walker, z, stance)
     # The stance foot stands in the middle of a pad.
-    if ground.terrain.has_pads:
-        foothold = feet_motion(walker.whole, start)[stance].along
+    if site.ground.terrain.has_pads:
+        foothold = forms.feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
-        laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
-    walk_state = walk_state_on_section(walker, laid, start, 2, stance)
+        site = replace_terrain(site, checkerboard(pitch_m, lanes))
+    walk_state = walk_state_on_section(site, start, 2, stance)
     standing = float(walk_state.foothold[stance])
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
@@ -210,14 +202,14 @@ def step_from_section(
     stopped = walk_on(walker, tolerances, walk_state, observer, start, 1)
     end = np.array(stopped.state)
     landed = 1 - stance
-    along = feet_motion(walker.whole, stopped.state)[landed].along
+    along = forms.feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     # Project the flow's derivative onto the section, along the flow.
     if derived:
         system = present_walker(walker, walk_state)
-        rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
+        rate = state_rate(system, forms.to_form(system.form, end), end.size, stopped.time_s)
         gradient = np.zeros(end.size)
         n = int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
@@ -226,7 +218,7 @@ def step_from_section(
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
     advance, rose = (float(end[index] - start[index]) for index in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
-    half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
+    half = min(1.0, max(-1.0, 0.5 * spacing / site.ground.frame.leg_length))
     pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
     cut_off = stopped.time_s - walk_state.touch_time[0] < pulse
     return SectionStep(
@@ -248,18 +240,13 @@ def step_from_section(
 
 
 def walk_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    heights: Floats,
-    push: float,
-    stance: int = STANCE_FOOT,
+    site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float, stance: int
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
+    walker = site.walker
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
+    walk_state = walk_state_on_section(with_footholds(site, heights), start, steps + 1, stance)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
@@ -269,7 +256,7 @@ def walk_from_section(
         # With room for a single touchdown, the walk stops there for the push.
         stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(
-            place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
+            forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
         )
         stopped = replace(stopped, state=pushed)
     landed = list[float]()
@@ -292,7 +279,7 @@ def walk_from_section(
     times = walk_state.touch_time[:touched]
     along = walk_state.touch_along[:touched]
     rises = np.diff(walk_state.touch_height[:touched])
-    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), rises)
+    angles = touch_angles(walker, site.ground.frame.leg_length, np.diff(along), rises)
     if differ:
         angles = np.array(landed[: angles.size])
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
@@ -315,27 +302,22 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 
 
 def sample_legs_from_section(
-    walker: ContactWalker,
-    ground: JudgedGround,
-    tolerances: Tolerances,
-    z: Floats,
-    heights: Floats,
-    times: Floats,
-    stance: int = STANCE_FOOT,
+    site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats, stance: int
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
+    walker = site.walker
     start = state_on_section(walker, z, stance)
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size, stance)
+    walk_state = walk_state_on_section(with_footholds(site, heights), start, heights.size, stance)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
     legs = [ANGLES + walker.legs[foot][0] for foot in (stance, 1 - stance)]
     return np.asarray(observer.samples.states[:, legs])
 
 
-def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+def with_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
     # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
     over = np.append(heights[0], heights) - heights[0]
-    return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
+    return replace_terrain(site, site.ground.terrain._replace(heights=over)) if over.any() else site
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
@@ -348,12 +330,12 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     """Return a state of the free walker just after an impulse (N s) at the hip along the slope."""
     form = system.form
     new = np.array(state)
-    y = to_form(form, new)
+    y = forms.to_form(form, new)
     n = int(form.bodies)
     half = int(form.places + form.bodies)
     s, c, r = np.zeros((3, n))
     M = np.zeros((n, n))
-    sines_cosines(form, y, s, c)
+    forms.sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     # A forward impulse above the centre of mass turns the walker clockwise.
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
@@ -361,36 +343,24 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     solve_linked(form.E[0], n, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r
-    return tuple(to_full(form, y, walker.size).tolist())
+    return tuple(forms.to_full(form, y, walker.size).tolist())
 
 
-def walk_state_on_section(
-    walker: ContactWalker, ground: JudgedGround, start: State, steps: int, stance: int = STANCE_FOOT
-) -> WalkState:
+def walk_state_on_section(site: WalkerOnGround, start: State, steps: int, stance: int) -> WalkState:
     """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
     swing = 1 - stance
-    walk_state = new_walk_state(walker, ground, stance, steps, start)
-    feet = feet_motion(walker.whole, start)
+    walk_state = new_walk_state(site.walker, site.ground, stance, steps, start)
+    feet = forms.feet_motion(site.walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
     walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
-        ground.terrain, bool(walk_state.has_ground[swing]), False, True
+        site.ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
     # The swing foot is above the gap that follows the pad it left.
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
-    walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
+    walk_state.foothold[swing] = feet[stance].along - site.ground.frame.leg_length
     return walk_state
-
-
-@dataclass(frozen=True)
-class WalkerOnGround:
-    walker: ContactWalker
-    ground: JudgedGround
-
-
-def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
-    return replace(site, ground=site.ground._replace(terrain=terrain))
 
 
 def section_units(site: WalkerOnGround, stance: int) -> Floats:
@@ -431,7 +401,7 @@ class ContactMap(StepMap):
         first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
         """
 
-        @lru_cache(CACHE_SIZE)
+        @lru_cache(maps.CACHE_SIZE)
         def site_at(p: float) -> WalkerOnGround | None:
             site = walker_at(p)
             if site is None or not site.ground.terrain.has_pads:
@@ -459,21 +429,21 @@ class ContactMap(StepMap):
         pitch_m = site.ground.terrain.pitch
         stance = self._stance(swing)
         z_m = z * self._units[swing % 2]
-        return step_from_section(site.walker, site.ground, self.tolerances, z_m, pitch_m, derived, stance)
+        return step_from_section(site, self.tolerances, z_m, pitch_m, derived, stance)
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)
         if site is None:
-            return failed_step(None, z.size)
+            return maps.failed_step(None, z.size)
         step = self._walk(site, z, derived, swing)
         if step.outcome is not Outcome.WALKED:
-            return failed_step(step.outcome, z.size)
+            return maps.failed_step(step.outcome, z.size)
         units, ahead = self._units[swing % 2], self._units[(swing + 1) % 2]
         DP = step.DP * units / ahead[:, None] if derived else step.DP
         return replace(step, z=step.z / ahead, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         slip = 0.0
         tripped = 0.0
         start = z
@@ -490,10 +460,10 @@ class ContactMap(StepMap):
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        scene = (site.walker, site.ground, endless)
-        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, self._stance(swing))
+        start = z * self._units[swing % 2]
+        walk = walk_from_section(site, endless, start, heights_m, push_N_s, self._stance(swing))
         # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
         # units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
@@ -503,15 +473,15 @@ class ContactMap(StepMap):
         return z if site is None else stand(site.walker, z * self._units[0], self._stance(0)) / self._units[0]
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
         start = z * self._units[0]
-        return sample_legs_from_section(site.walker, site.ground, endless, start, heights_m, times, self._stance(0))
+        return sample_legs_from_section(site, endless, start, heights_m, times, self._stance(0))
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        stride = walk_steps(self, z, p, self.stride, derived=False)
+        stride = maps.walk_steps(self, z, p, self.stride, derived=False)
         if stride.outcome is not Outcome.WALKED:
             return None
         works = [step.driven for step in stride.steps if isinstance(step, SectionStep)]
@@ -520,7 +490,7 @@ class ContactMap(StepMap):
         return DrivenWork(works[0].weight, *sums).cost_of_transport(math.fsum(stride.lengths_m))
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        site = valid(self._at(p))
+        site = maps.valid(self._at(p))
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def replace_tolerances(self, tolerances: Tolerances) -> ContactMap:
@@ -549,9 +519,8 @@ class AdaptivePads(Stepper):
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         index = swing % len(self.pitches_m)
-        walker = self.walker_at(p)
-        pitch_m = self.pitches_m[index]
-        step = step_from_section(walker, self.ground, self.tolerances, z, pitch_m, derived, stance_of(swing))
+        site = WalkerOnGround(self.walker_at(p), self.ground)
+        step = step_from_section(site, self.tolerances, z, self.pitches_m[index], derived, stance_of(swing))
         if step.outcome is Outcome.WALKED:
             self.pitches_m[index] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m
         return step

@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 
 from walkerlab.physics.hybrid.recorded_walk import describe_pulls, take_walk
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING
-from walkerlab.physics.mechanics.rigid_model import (
-    STANCE,
-    SWING,
-    RigidModel,
-    change_slope,
-    feet_on_slope,
-    pair,
-    replace_fields,
-    swing_foot_motion,
-)
+from walkerlab.physics.mechanics import rigid_model as rigid
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits import rigid_map
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.physics.orbits.newton import Effort, NotConverged
@@ -129,8 +121,8 @@ def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     # The step map is discontinuous at such a gait: if the foot came down slightly further ahead, it would strike.
     if not walker.alike:
         return False
-    over = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE])
-    ahead = swing[:, SWING] - swing[:, STANCE]
+    over = rigid.feet_on_slope(walker, swing[:, rigid.SWING], swing[:, rigid.STANCE])
+    ahead = swing[:, rigid.SWING] - swing[:, rigid.STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
@@ -150,9 +142,10 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
     models = (walker, walker.exchanged)[:count]
     swings = [step.samples.state[step.samples.step == k] for k in range(count)]
     bent = [step.samples.bent[step.samples.step == k] for k in range(count)]
-    apart = [swing[:, SWING] - swing[:, STANCE] for swing in swings]
+    apart = [swing[:, rigid.SWING] - swing[:, rigid.STANCE] for swing in swings]
     rates = [
-        swing_foot_motion(model, y[0], y[0, y.shape[1] // 2 :])[2] for model, y in zip(models, swings, strict=True)
+        rigid.swing_foot_motion(model, y[0], y[0, y.shape[1] // 2 :])[2]
+        for model, y in zip(models, swings, strict=True)
     ]
     rate = 1.0 / units.time
     n = len(start) // 2
@@ -341,7 +334,7 @@ def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
 
 
 def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> rigid_map.RigidMap:
-    return rigid_map.RigidMap(partial(change_slope, walker), 1.0, walker, tolerances)
+    return rigid_map.RigidMap(partial(rigid.change_slope, walker), 1.0, walker, tolerances)
 
 
 def average_legs(walker: RigidModel, share: float) -> RigidModel:
@@ -354,19 +347,19 @@ def average_legs(walker: RigidModel, share: float) -> RigidModel:
         other = models[1 - k]
         parts = {name: 0.5 * ((1.0 + share) * model[name] + (1.0 - share) * other[name]) for name in LEG_FIELDS}
         alike = walker.alike or share == 0.0
-        return replace_fields(model, {**parts, "alike": alike})
+        return rigid.replace_fields(model, {**parts, "alike": alike})
 
-    return blend_models(0) if share == 0.0 else pair(blend_models(0), blend_models(1))
+    return blend_models(0) if share == 0.0 else rigid.pair(blend_models(0), blend_models(1))
 
 
 def scale_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
     """Return the walker with a fraction `share` of its drive, on a slope (rad) between `slope` and the walker's."""
 
     def weaker(model: RigidModel) -> RigidModel:
-        return replace_fields(model, {name: share * model[name] for name in ("laws", "push_off")})
+        return rigid.replace_fields(model, {name: share * model[name] for name in ("laws", "push_off")})
 
-    driven = weaker(walker) if walker.paired_with is None else pair(weaker(walker), weaker(walker.paired_with))
-    return change_slope(driven, slope + share * (walker.slope - slope))
+    driven = weaker(walker) if walker.paired_with is None else rigid.pair(weaker(walker), weaker(walker.paired_with))
+    return rigid.change_slope(driven, slope + share * (walker.slope - slope))
 
 
 @dataclass
@@ -391,7 +384,7 @@ class Search:
     def follow_seeds(self) -> None:
         if self.walker.slope <= 0.0 or not self.walker.passive or self.walker.legs_differ:
             return
-        for branch in slope_branches(change_slope(self.walker, 0.0)):
+        for branch in slope_branches(rigid.change_slope(self.walker, 0.0)):
             (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
             if z is None:
                 self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
@@ -452,7 +445,7 @@ class Search:
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
         # The first coordinate was drawn as the angle between the legs. With both feet on the slope it determines the
         # stance leg's.
-        starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
+        starts[:, 0] = 0.5 * (starts[:, 0] - rigid.feet_on_slope(self.walker, 0.0, 0.0))
         if self.walker.legs_differ:
             self.search_strides(starts)
             return
@@ -475,7 +468,7 @@ class Search:
 
     def stands(self, z: Floats) -> bool:
         # With both feet on the slope, this sum with the stance leg counted twice is the angle between the legs.
-        return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
+        return bool(abs(rigid.feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
         """Solve for the gait near z to rounding error and record it, and return whether a gait was found."""

@@ -14,14 +14,8 @@ import numpy as np
 
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker, changed_forms
-from walkerlab.physics.hybrid.comparison import (
-    PHASES,
-    Motion,
-    add_strike_samples,
-    difference_in_phase,
-    difference_in_time,
-    smooth_phases,
-)
+from walkerlab.physics.hybrid import comparison
+from walkerlab.physics.hybrid.comparison import Motion
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, scale_laws
@@ -176,11 +170,13 @@ class Limit:
         if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         legs = leg_motion(sampled.samples.states, walker)
-        motion = add_strike_samples(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
-        phases = np.linspace(0.0, 1.0, PHASES)
-        aligned = difference_in_phase(motion, self.motion, phases)
-        smooth = smooth_phases(motion, self.motion, phases)
-        _, raw = difference_in_time(motion, self.motion)
+        motion = comparison.add_strike_samples(
+            Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s)
+        )
+        phases = np.linspace(0.0, 1.0, comparison.PHASES)
+        aligned = comparison.difference_in_phase(motion, self.motion, phases)
+        smooth = comparison.smooth_phases(motion, self.motion, phases)
+        _, raw = comparison.difference_in_time(motion, self.motion)
         return replace(
             distance,
             angle=float(np.abs(aligned.angle[smooth]).max()),

@@ -21,22 +21,9 @@ from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.hybrid.rigid_record import Observer, new_observer, unwatched
 from walkerlab.physics.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
+from walkerlab.physics.mechanics import rigid_model as rigid
 from walkerlab.physics.mechanics.impact import pushed_at_hip
-from walkerlab.physics.mechanics.rigid_model import (
-    AT_STRIKE,
-    STANCE,
-    STRAIGHT,
-    SWING,
-    RigidModel,
-    compute_in_turns,
-    feet_on_slope,
-    hip_height,
-    mass_matrix,
-    models_in_turn,
-    momentum,
-    step_length_changes,
-    step_lengths,
-)
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import (
     CACHE_SIZE,
@@ -99,21 +86,21 @@ class StrikeSection(NamedTuple):
 @lru_cache(CACHE_SIZE)
 def strike_section(walker: RigidModel) -> StrikeSection:
     """Return the section of a walker just after heel strike, where its legs are straight."""
-    straight = walker.E[STRAIGHT]
-    at_strike = walker.E[AT_STRIKE]
+    straight = walker.E[rigid.STRAIGHT]
+    at_strike = walker.E[rigid.AT_STRIKE]
     d = int(walker.coordinates)
     n = len(straight)
     places = walker.section[:d]
     origin = np.zeros(2 * n)
     basis = np.zeros((d, 2 * n))
-    origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
+    origin[:n] = -rigid.feet_on_slope(walker, 0.0, 0.0) * straight[:, rigid.SWING]
     # With both feet on the slope, the legs' angles have a constant sum.
-    basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
+    basis[0, :n] = straight[:, rigid.STANCE] - straight[:, rigid.SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
     start = np.append(origin, TANGENT_SCALE * basis)
     curved = None if walker.alike else walker
-    return StrikeSection(models_in_turn(walker), start, basis, np.append(places, columns), curved)
+    return StrikeSection(rigid.models_in_turn(walker), start, basis, np.append(places, columns), curved)
 
 
 def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] | None:
@@ -122,9 +109,9 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     The swing leg is behind. Returns None if it is too short or too long to reach the slope.
     """
     psi = stance + walker.slope
-    straight = walker.E[STRAIGHT]
+    straight = walker.E[rigid.STRAIGHT]
     # height of the hip above the centre of the swing foot's arc, which is one radius above the slope
-    raised = hip_height(walker, np.full(2, stance)) - walker.swing_radius
+    raised = rigid.hip_height(walker, np.full(2, stance)) - walker.swing_radius
     length, ahead = (f(walker.swing_hip_x, walker.swing_hip_y) for f in (math.hypot, math.atan2))
     if abs(raised) >= length:
         return None
@@ -132,7 +119,9 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     # derivative of -acos(raised / length)
     rate = (math.cos(psi) * walker.hip_x - math.sin(psi) * walker.hip_y) / (length * math.sin(behind))
     swing = ahead - behind - walker.slope
-    return stance * straight[:, STANCE] + swing * straight[:, SWING], straight[:, STANCE] + rate * straight[:, SWING]
+    return stance * straight[:, rigid.STANCE] + swing * straight[:, rigid.SWING], straight[
+        :, rigid.STANCE
+    ] + rate * straight[:, rigid.SWING]
 
 
 def section_basis(section: StrikeSection, z: Floats) -> Floats:
@@ -279,7 +268,7 @@ class RigidStepper(local):
             return None
         before, after = (states.reshape(m + 2, m) for states in (strikes.before, strikes.after))
         samples = observer.states.reshape(times.size, m + 2, m)
-        legs = [SWING, STANCE]
+        legs = [rigid.SWING, rigid.STANCE]
         rates = samples[:, 0, m // 2 :][:, legs]
         by = (strikes.waits[0], before[1:], after[1:], samples[:, 1:, legs])
         return StepTangents(before[0], rates, *(each / TANGENT_SCALE for each in by))
@@ -378,6 +367,146 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
     return NO_GAIT
 
 
+def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
+    """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
+    swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
+    return np.where(swaps, angles[..., ::-1], angles)
+
+
+def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Floats:
+    """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
+
+    Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
+    there. s makes such a change as large as the rates, on average.
+    """
+    free = section.basis[1:]
+    rates = coordinates_of(walker, start)[1:]
+    M = free[:, start.size // 2 :] @ rigid.mass_matrix(walker, start) @ free[:, start.size // 2 :].T
+    kicks = np.linalg.inv(np.linalg.cholesky(M))
+    return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
+
+
+class LegSwing(NamedTuple):
+    """A leg's swing: the model and the section at its start, and what the length of its step depends on."""
+
+    walker: RigidModel
+    section: StrikeSection
+    slope: float
+    radius: float  # of the stance foot
+    levers: list[tuple[float, float]]  # of each body, to the swing foot
+
+    def step_length(self, before: float, end: Floats) -> float:
+        """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
+        angles = end[: len(self.levers)].tolist()
+        ahead = self.radius * (before - angles[rigid.STANCE])
+        for angle, (x, y) in zip(angles, self.levers, strict=True):
+            psi = angle + self.slope
+            ahead += math.cos(psi) * x - math.sin(psi) * y
+        return float(ahead)
+
+
+def floats_of(walker: RigidModel) -> tuple[float, float, list[tuple[float, float]]]:
+    """Return the slope, the radius of the stance foot, and the levers to the swing foot."""
+    levers = list(zip(walker.foot_x.tolist(), walker.foot_y.tolist(), strict=True))
+    return float(walker.slope), float(walker.radius), levers
+
+
+class SimilarWalker(NamedTuple):
+    """A walker scaled to unit size, with its walks from the section in SI units."""
+
+    walker: RigidModel
+    units: Units
+    section: StrikeSection
+    swings: tuple[LegSwing, ...]  # one for each leg that swings next; a single one for equal legs
+    # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
+    feet: list[list[float]]
+    radius: float
+    apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
+
+    def swinging(self, swing: int) -> LegSwing:
+        """Return the leg that swings in the step `swing`, as in `Stepper.step`."""
+        return self.swings[swing % len(self.swings)]
+
+    def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
+        """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""
+        rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
+        return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
+
+    def step_length(self, before: float, after: float) -> float:
+        """Return a step's length from the stance leg's angles (rad) just after the strikes at its start and end."""
+        behind = 0.0  # along the slope, from the landing foot to the old stance foot
+        for start, turning, x, y in self.feet:
+            psi = start + after * turning
+            behind += math.cos(psi) * x - math.sin(psi) * y
+        return self.radius * (before + after + self.apart) - behind
+
+    def take_disturbed_walk(
+        self, stepper: RigidStepper, z: Floats, heights_m: Floats, push_N_s: float, swing: int
+    ) -> DisturbedWalk:
+        """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
+        walker, section, *_ = self.swinging(swing)
+        units = self.units
+        start = np.array(state_on_section(walker, z))
+        start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
+        walk = stepper.walk(section, z, heights_m.size - 1, False, self.floor(z, heights_m), start)
+        before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
+        starts = np.vstack((start, after))[:-1]
+        lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
+        durations = np.diff(walk.time, prepend=0.0) * units.time
+        last = walk.z[-1] if walk.z.size else z
+        return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
+
+    def differentiate_walk(
+        self, stepper: RigidStepper, z: Floats, heights_m: Floats, along: Floats, times_s: Floats, kicked: bool
+    ) -> VariedWalk | None:
+        """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
+        units, (d, m), steps = self.units, self.section.basis.shape, heights_m.size - 1
+        rises, nearest = self.floor(z, heights_m)
+        walk = stepper.walk(self.section, z, steps, False, (rises, nearest))
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        starts = np.vstack((state_on_section(self.walker, z), walk.strikes.after))
+        touches = np.append(0.0, walk.time)
+        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
+        kicks = [unit_kicks(*self.swinging(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
+        given = along.shape[1]
+        count = along.shape[1] + sum(map(len, kicks))
+        lifts = np.zeros((steps + 1, count))
+        lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
+        columns = np.zeros((count, m))
+        since = np.zeros(count)
+        columns[:given] = along[:d].T @ section_basis(self.section, z)
+        of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
+        parts = list[tuple[Floats, ...]]()
+        for step, start in enumerate(starts[:-1]):
+            walker, section, *_ = self.swinging(step)
+            room = LAST_SAMPLE * (touches[step + 1] - touches[step])
+            times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
+            tangents = stepper.differentiate(section, start, (rises[step : step + 2], nearest), times)
+            if tangents is None:
+                return None
+            moved = np.column_stack((columns, lifts[step + 1]))
+            before, after = moved @ tangents.before, moved @ tangents.after
+            lengths = rigid.step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
+            # The times of samples are fixed, so a step that begins later is sampled earlier.
+            samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
+            parts.append((moved @ tangents.waits, lengths, after[:, rigid.STANCE], tangents.rates, samples))
+            columns = after
+            since = since + parts[-1][0]
+            if step < len(kicks):
+                first = given + sum(map(len, kicks[:step]))
+                columns[first : first + len(kicks[step])] = kicks[step]
+        durations, lengths, angles = (np.array(each) for each in list(zip(*parts, strict=True))[:3])
+        rates, samples = (np.concatenate(each) for each in list(zip(*parts, strict=True))[3:])
+        return VariedWalk(
+            durations * units.time,
+            lengths * units.length,
+            angles,
+            reorder_by_leg(rates, of_step) / units.time,
+            reorder_by_leg(samples, of_step),
+        )
+
+
 class RigidMap(StepMap):
     """Step map of the rigid model, in section coordinates of the walker scaled to unit size."""
 
@@ -403,8 +532,8 @@ class RigidMap(StepMap):
             n = len(unit.arm_x)
             feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
             walkers = (unit, unit.exchanged) if unit.legs_differ else (unit,)
-            swings = tuple(Swing(each, strike_section(each), *floats_of(each)) for each in walkers)
-            rolling = float(unit.radius), float(-section.start[SWING])
+            swings = tuple(LegSwing(each, strike_section(each), *floats_of(each)) for each in walkers)
+            rolling = float(unit.radius), float(-section.start[rigid.SWING])
             return SimilarWalker(unit, units, section, swings, feet.tolist(), *rolling)
 
         self._unit_at = unit_at
@@ -449,26 +578,15 @@ class RigidMap(StepMap):
     def take_disturbed_walk(
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = valid(self._unit_at(p))
-        walker, section, *_ = unit.swinging(swing)
-        units = unit.units
-        start = np.array(state_on_section(walker, z))
-        start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        walk = self._exact.walk(section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
-        before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
-        starts = np.vstack((start, after))[:-1]
-        lengths = compute_in_turns(walker, np.arange(len(before)), step_lengths, starts, before)
-        durations = np.diff(walk.time, prepend=0.0) * units.time
-        last = walk.z[-1] if walk.z.size else z
-        return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, STANCE], last)
+        return unit.take_disturbed_walk(self._exact, z, heights_m, push_N_s, swing)
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = valid(self._unit_at(p))
         observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
         floor = unit.floor(z, heights_m)
         self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
-        return reorder_by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
+        return reorder_by_leg(observer.states[:, [rigid.SWING, rigid.STANCE]], observer.steps)
 
     def differentiate_walk(
         self,
@@ -479,55 +597,8 @@ class RigidMap(StepMap):
         times_s: Floats = NO_TIMES,
         kicked: bool = False,
     ) -> VariedWalk | None:
-        """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
         unit = self._unit_at(p)
-        if unit is None:
-            return None
-        units, (d, m), steps = unit.units, unit.section.basis.shape, heights_m.size - 1
-        rises, nearest = unit.floor(z, heights_m)
-        walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
-        if walk.outcome is not Outcome.WALKED:
-            return None
-        starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
-        touches = np.append(0.0, walk.time)
-        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
-        kicks = [unit_kicks(*unit.swinging(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
-        given = along.shape[1]
-        count = along.shape[1] + sum(map(len, kicks))
-        lifts = np.zeros((steps + 1, count))
-        lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
-        columns = np.zeros((count, m))
-        since = np.zeros(count)
-        columns[:given] = along[:d].T @ section_basis(unit.section, z)
-        of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
-        parts = list[tuple[Floats, ...]]()
-        for step, start in enumerate(starts[:-1]):
-            walker, section, *_ = unit.swinging(step)
-            room = LAST_SAMPLE * (touches[step + 1] - touches[step])
-            times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
-            tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
-            if tangents is None:
-                return None
-            moved = np.column_stack((columns, lifts[step + 1]))
-            before, after = moved @ tangents.before, moved @ tangents.after
-            lengths = step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
-            # The times of samples are fixed, so a step that begins later is sampled earlier.
-            samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
-            parts.append((moved @ tangents.waits, lengths, after[:, STANCE], tangents.rates, samples))
-            columns = after
-            since = since + parts[-1][0]
-            if step < len(kicks):
-                first = given + sum(map(len, kicks[:step]))
-                columns[first : first + len(kicks[step])] = kicks[step]
-        durations, lengths, angles = (np.array(each) for each in list(zip(*parts, strict=True))[:3])
-        rates, samples = (np.concatenate(each) for each in list(zip(*parts, strict=True))[3:])
-        return VariedWalk(
-            durations * units.time,
-            lengths * units.length,
-            angles,
-            reorder_by_leg(rates, of_step) / units.time,
-            reorder_by_leg(samples, of_step),
-        )
+        return None if unit is None else unit.differentiate_walk(self._exact, z, heights_m, along, times_s, kicked)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         unit = self._unit_at(p)
@@ -547,7 +618,7 @@ class RigidMap(StepMap):
         units = unit.units
         start = state_on_section(walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
-        impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
+        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
         walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
         return impulse * units.impulse, walk.min_normal_force * units.force
 
@@ -585,75 +656,3 @@ class RigidMap(StepMap):
         all_points = np.concatenate(points)
         periods = np.concatenate(times) * unit.units.time
         return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
-
-
-def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
-    """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
-    swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
-    return np.where(swaps, angles[..., ::-1], angles)
-
-
-def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Floats:
-    """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
-
-    Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
-    there. s makes such a change as large as the rates, on average.
-    """
-    free = section.basis[1:]
-    rates = coordinates_of(walker, start)[1:]
-    M = free[:, start.size // 2 :] @ mass_matrix(walker, start) @ free[:, start.size // 2 :].T
-    kicks = np.linalg.inv(np.linalg.cholesky(M))
-    return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
-
-
-class Swing(NamedTuple):
-    """A leg's swing: the model and the section at its start, and what the length of its step depends on."""
-
-    walker: RigidModel
-    section: StrikeSection
-    slope: float
-    radius: float  # of the stance foot
-    levers: list[tuple[float, float]]  # of each body, to the swing foot
-
-    def step_length(self, before: float, end: Floats) -> float:
-        """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
-        angles = end[: len(self.levers)].tolist()
-        ahead = self.radius * (before - angles[STANCE])
-        for angle, (x, y) in zip(angles, self.levers, strict=True):
-            psi = angle + self.slope
-            ahead += math.cos(psi) * x - math.sin(psi) * y
-        return float(ahead)
-
-
-def floats_of(walker: RigidModel) -> tuple[float, float, list[tuple[float, float]]]:
-    """Return the slope, the radius of the stance foot, and the levers to the swing foot."""
-    levers = list(zip(walker.foot_x.tolist(), walker.foot_y.tolist(), strict=True))
-    return float(walker.slope), float(walker.radius), levers
-
-
-class SimilarWalker(NamedTuple):
-    walker: RigidModel
-    units: Units
-    section: StrikeSection
-    swings: tuple[Swing, ...]  # one for each leg that swings next; a single one for equal legs
-    # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
-    feet: list[list[float]]
-    radius: float
-    apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
-
-    def swinging(self, swing: int) -> Swing:
-        """Return the leg that swings in the step `swing`, as in `Stepper.step`."""
-        return self.swings[swing % len(self.swings)]
-
-    def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
-        """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""
-        rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
-        return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
-
-    def step_length(self, before: float, after: float) -> float:
-        """Return a step's length from the stance leg's angles (rad) just after the strikes at its start and end."""
-        behind = 0.0  # along the slope, from the landing foot to the old stance foot
-        for start, turning, x, y in self.feet:
-            psi = start + after * turning
-            behind += math.cos(psi) * x - math.sin(psi) * y
-        return self.radius * (before + after + self.apart) - behind

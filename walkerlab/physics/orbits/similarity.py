@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.mechanics.hinges import SpringDamper
+from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 
 HIPS = ("hip_x", "hip_y", "swing_hip_x", "swing_hip_y")
@@ -55,8 +55,7 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
     scales = {
         **dict.fromkeys(("A", "B", "unpaired"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),
-        # Stiffness and torque have the dimension of an energy, because angles have none.
-        "laws": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
+        "laws": 1.0 / np.array(hinge_law(walker, HIP_ROW).units(units.energy, units.time)),
         "push_off": 1.0 / units.impulse,
         **dict.fromkeys(("radius", "swing_radius", "foot_x", "foot_y", *HIPS), 1.0 / length),
     }

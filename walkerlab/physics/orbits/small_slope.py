@@ -20,17 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from walkerlab.physics.mechanics import rigid_model as rigid
 from walkerlab.physics.mechanics.impact import strike
-from walkerlab.physics.mechanics.rigid_model import (
-    AT_STRIKE,
-    STRAIGHT,
-    RigidModel,
-    apply_couplings,
-    change_slope,
-    equations,
-    kinetic_energy,
-    swing_foot,
-)
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.solvers.system import Floats, State
 
 LONG_PERIOD = "long-period seed"
@@ -70,9 +62,9 @@ def linear_modes(walker: RigidModel) -> Modes | None:
     """Return the modes of the swing phase about upright legs, or None if the legs have too little inertia."""
     legs = leg_columns(walker)
     n = len(walker.arm_x)
-    level = change_slope(walker, 0.0)
+    level = rigid.change_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
-    equations(level, level.zero_state, s, c, F, U, inertias, r)
+    rigid.equations(level, level.zero_state, s, c, F, U, inertias, r)
     M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
     # det(K - x M) = first x^2 - 2 half x + last
     first, last = np.linalg.det(M), np.linalg.det(K)
@@ -92,7 +84,7 @@ def linear_modes(walker: RigidModel) -> Modes | None:
 
 def leg_columns(walker: RigidModel) -> Floats:
     """Return the angles (n, 2) of all bodies for unit angles of the swing leg and the stance leg, one column each."""
-    return np.array([apply_couplings(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
+    return np.array([rigid.apply_couplings(walker, rigid.STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
@@ -137,20 +129,20 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
     """Return slope / angle^3, where the slope balances the heel strike's loss at this angle between the legs."""
     # In the limit the gait ends a step as it began it, with both legs at the same rates.
-    flat = change_slope(walker, 0.0)
+    flat = rigid.change_slope(walker, 0.0)
     angle = LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
     after = apply_strike(flat, before)
-    lost = kinetic_energy(flat, before) - kinetic_energy(flat, after)
-    length = swing_foot(flat, before)[1] + flat.radius * angle
+    lost = rigid.kinetic_energy(flat, before) - rigid.kinetic_energy(flat, after)
+    length = rigid.swing_foot(flat, before)[1] + flat.radius * angle
     return float(lost / (flat.mass * flat.gravity * length * angle**3))
 
 
 @np.errstate(divide="raise", invalid="raise")
 def apply_strike(walker: RigidModel, state: State) -> Floats:
     after = np.zeros(len(state))
-    strike(walker, walker, AT_STRIKE, np.array(state), after)
+    strike(walker, walker, rigid.AT_STRIKE, np.array(state), after)
     return after
 
 
@@ -199,7 +191,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     """Return the linearised conditions on a step on a slope of one radian: matrices (..., 4, 4) for durations t (s)."""
     # The matrices act on (z, 1). Three rows require that z repeats after t, one that both feet are down. A solution
     # exists if the determinant vanishes.
-    flat = change_slope(walker, 0.0)
+    flat = rigid.change_slope(walker, 0.0)
     n = len(walker.arm_x)
     swing = modes.swing
     fall = modes.fall

@@ -218,7 +218,7 @@ def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) ->
             points.append(gait.z)
             continue
         # start on the attractors of neighbouring cells, then near the cell's unstable gait, in its direction of growth
-        off_gait = None if gait is None else gait.z + UNSTABLE_OFFSET * eigenvector(gait.DP, gait.multipliers[0].real)
+        off_gait = None if gait is None else gait.z + UNSTABLE_OFFSET * eigenvector(gait.DP, gait.multipliers[0])
         point = None
         starts = (points[index - 1] if index else None, before[index], off_gait)
         for start in (start for start in starts if start is not None):

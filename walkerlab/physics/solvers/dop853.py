@@ -11,23 +11,9 @@ import numpy as np
 
 from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.solvers import dop853_tableau as tableau
-from walkerlab.physics.solvers import stepping
-from walkerlab.physics.solvers.lanes import fused
-from walkerlab.physics.solvers.stepping import (
-    ACCEPTED,
-    BUDGET,
-    H_NEXT,
-    OUT_OF_BUDGET,
-    REJECTED,
-    RHS,
-    SMALLEST_STEP,
-    STEP_DONE,
-    STEP_TOO_SMALL,
-    T_OLD,
-    T,
-    new_counts,
-)
-from walkerlab.physics.solvers.system import Floats, block, derivative
+from walkerlab.physics.solvers import lanes, stepping
+from walkerlab.physics.solvers.lanes import fused, stage_state
+from walkerlab.physics.solvers.system import Floats, State, block, derivative
 
 # With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
 # more work.
@@ -50,7 +36,7 @@ def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
 
 STAGE_NODES = np.array(tableau.NODES)
 # row s: weights of the state of stage s; row LAST_STAGE: weights of the solution
-A = rows([(), *(getattr(tableau, f"A_{stage}") for stage in range(2, ALL_STAGES + 1))], ALL_STAGES)
+A = rows(tableau.A, ALL_STAGES)
 D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL_STAGES)
 ERROR_WEIGHTS_5 = np.array(tableau.ERROR_5)
 ERROR_WEIGHTS_3 = np.array(tableau.ERROR_3)
@@ -75,7 +61,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
     y_old, y, at = np.zeros((3, n))
     stages = np.zeros((ALL_STAGES, n))
     dense = np.zeros((7, n))
-    return Dop853(rtol, atol, np.zeros(3), y_old, y, new_counts(budget), at, stages, dense)
+    return Dop853(rtol, atol, np.zeros(3), y_old, y, stepping.new_counts(budget), at, stages, dense)
 
 
 @kernel_part
@@ -98,7 +84,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
             for i in range(width):
                 at[start + i] = fused(h, total[i], y[start + i])
         derivative(system, t + STAGE_NODES[s] * h, at, K[s])
-    method.counts[RHS] += end - first
+    method.counts[stepping.RHS] += end - first
 
 
 @kernel_part
@@ -162,11 +148,11 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     slope = method.stages[LAST_STAGE]
     # No step has been taken yet, so this row is free.
     ahead = method.stages[0]
-    clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
+    clock[stepping.T_OLD], clock[stepping.T], clock[stepping.H_NEXT] = t, t, h
     for i in range(method.y.size):
         method.y[i] = y[i]
     derivative(system, t, method.y, slope)
-    method.counts[RHS] += 1
+    method.counts[stepping.RHS] += 1
     if h > 0.0:
         return
     size = scaled_norm(method, method.y)
@@ -175,13 +161,13 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     for i in range(at.size):
         at[i] = fused(guess, slope[i], method.y[i])
     derivative(system, t + guess, at, ahead)
-    method.counts[RHS] += 1
+    method.counts[stepping.RHS] += 1
     for i in range(at.size):
         at[i] = ahead[i] - slope[i]
     curvature = scaled_norm(method, at) / guess
     steepest = max(steepness, curvature)
     h_curvature = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** EXPONENT
-    clock[H_NEXT] = min(100.0 * guess, h_curvature)
+    clock[stepping.H_NEXT] = min(100.0 * guess, h_curvature)
 
 
 @stepping.advance.case(Dop853)
@@ -192,33 +178,33 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     y_old = method.y_old
     y = method.y
     K = method.stages
-    t, h = clock[T], clock[H_NEXT]
+    t, h = clock[stepping.T], clock[stepping.H_NEXT]
     for i in range(y.size):
         # The derivative at the end of a step is the first stage of the next.
         y_old[i], K[0, i] = y[i], K[LAST_STAGE, i]
     limit = GROW_MOST
-    outcome = OUT_OF_BUDGET
-    while counts[RHS] < counts[BUDGET]:
+    outcome = stepping.OUT_OF_BUDGET
+    while counts[stepping.RHS] < counts[stepping.BUDGET]:
         # stretch a step that nearly reaches the end, rather than leave a tiny one
         last = t + 1.01 * h >= t_end
         if last:
             h = t_end - t
         error = try_step(method, system, t, h)
         if error <= 1.0:
-            counts[ACCEPTED] += 1
+            counts[stepping.ACCEPTED] += 1
             growth = limit if error == 0.0 else min(limit, change_of_step(error))
-            clock[T_OLD], clock[T] = t, t_end if last else t + h
+            clock[stepping.T_OLD], clock[stepping.T] = t, t_end if last else t + h
             # a step shortened by t_end says little about the next one
-            clock[H_NEXT] = max(clock[H_NEXT], h * growth) if last else h * growth
-            return STEP_DONE
-        counts[REJECTED] += 1
+            clock[stepping.H_NEXT] = max(clock[stepping.H_NEXT], h * growth) if last else h * growth
+            return stepping.STEP_DONE
+        counts[stepping.REJECTED] += 1
         # As in Hairer's code, the step does not grow right after a rejection.
         limit = 1.0
         # the error may be infinite or not a number
         h *= change_of_step(error) if error < 1e300 else 0.1
-        clock[H_NEXT] = h
-        if h <= SMALLEST_STEP * max(abs(t), 1.0):
-            outcome = STEP_TOO_SMALL
+        clock[stepping.H_NEXT] = h
+        if h <= stepping.SMALLEST_STEP * max(abs(t), 1.0):
+            outcome = stepping.STEP_TOO_SMALL
             break
     # Trial steps have overwritten the state and its derivative.
     for i in range(y.size):
@@ -230,13 +216,13 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
 def rewind_dop853(method: Dop853, system: Any) -> None:
     for i in range(method.y.size):
         method.y[i], method.stages[LAST_STAGE, i] = method.y_old[i], method.stages[0, i]
-    method.clock[T] = method.clock[T_OLD]
+    method.clock[stepping.T] = method.clock[stepping.T_OLD]
 
 
 @stepping.prepare_dense.case(Dop853)
 def prepare_dense_dop853(method: Dop853, system: Any) -> None:
     """Evaluate three more stages and the coefficients of the dense output."""
-    t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
+    t, h = method.clock[stepping.T_OLD], method.clock[stepping.T] - method.clock[stepping.T_OLD]
     evaluate_stages(method, system, t, h, LAST_STAGE + 1, ALL_STAGES)
     y_old = method.y_old
     y = method.y
@@ -263,3 +249,47 @@ def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> 
         low = fused(w1 * s, d[2, i], fused(w1, d[1, i], fused(s, d[0, i], method.y_old[i])))
         high = fused(w3 * s * r, d[5, i], fused(w3 * s, d[4, i], fused(w3, d[3, i], low)))
         y[i] = fused(w3 * s * r * s, d[6, i], high)
+
+
+# ---- walks in lanes --------------------------------------------------------------------------------------------------
+
+LANE_NODES = tableau.NODES
+WEIGHTS = tuple(tableau.nonzero(row) for row in tableau.A[: LAST_STAGE + 1])
+LANE_ERROR_5 = tableau.nonzero(tableau.ERROR_5)
+LANE_ERROR_3 = tableau.nonzero(tableau.ERROR_3)
+
+
+@kernel_part
+def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
+    """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
+    # Written out, because in compiled code tuples of different lengths are different types: no loop can extend them.
+    k2 = lanes.derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, WEIGHTS[1], (k1,)))
+    k3 = lanes.derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, WEIGHTS[2], (k1, k2)))
+    k4 = lanes.derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, WEIGHTS[3], (k1, k3)))
+    k5 = lanes.derivative(system, t + LANE_NODES[4] * h, stage_state(y, h, WEIGHTS[4], (k1, k3, k4)))
+    k6 = lanes.derivative(system, t + LANE_NODES[5] * h, stage_state(y, h, WEIGHTS[5], (k1, k4, k5)))
+    k7 = lanes.derivative(system, t + LANE_NODES[6] * h, stage_state(y, h, WEIGHTS[6], (k1, k4, k5, k6)))
+    k8 = lanes.derivative(system, t + LANE_NODES[7] * h, stage_state(y, h, WEIGHTS[7], (k1, k4, k5, k6, k7)))
+    k9 = lanes.derivative(system, t + LANE_NODES[8] * h, stage_state(y, h, WEIGHTS[8], (k1, k4, k5, k6, k7, k8)))
+    k10 = lanes.derivative(system, t + LANE_NODES[9] * h, stage_state(y, h, WEIGHTS[9], (k1, k4, k5, k6, k7, k8, k9)))
+    k11 = lanes.derivative(
+        system, t + LANE_NODES[10] * h, stage_state(y, h, WEIGHTS[10], (k1, k4, k5, k6, k7, k8, k9, k10))
+    )
+    k12 = lanes.derivative(system, t + h, stage_state(y, h, WEIGHTS[11], (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
+    needed = (k1, k6, k7, k8, k9, k10, k11, k12)
+    y_new = stage_state(y, h, WEIGHTS[12], needed)
+    return needed, y_new, lanes.derivative(system, t + h, y_new)
+
+
+@kernel_part
+def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
+    """Compute, for each error estimate, the sum of squares of error over tolerance. `method` holds rtol and atol."""
+    error_5 = 0.0
+    error_3 = 0.0
+    for i in range(len(y)):
+        scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))
+        relative_5 = by_order_5[i] * scale
+        relative_3 = by_order_3[i] * scale
+        error_5 += relative_5 * relative_5
+        error_3 += relative_3 * relative_3
+    return error_5, error_3

@@ -1,13 +1,12 @@
-"""Walks side by side: a vector type of compiled code with one number per walk, and steps of DOP853 on it.
+"""Walks side by side: a vector type of compiled code with one number per walk.
 
 One instruction serves several walks. A function of floats also compiles for lanes if it does not branch on them:
 arithmetic, square roots, `min`, `max` and `abs` act on each lane, and a float combined with lanes is the same in each
 lane. Lanes never mix, so a walk does not depend on its neighbours. Processors with shorter registers use several
 registers for the lanes.
 
-States are tuples of lanes, which stay in registers (see `dop853`). Hermite interpolation of an event function over a
-step finds crossings, which a repeated step then refines. It needs values and two derivatives at both ends, which
-explicit methods compute anyway; dense output costs more stages.
+States are tuples of lanes, which stay in registers. `dop853` has stages for them, and `events` finds crossings on the
+quintic through the ends of a step, which a repeated step then refines.
 
 Multiply-add is fused only where the code calls for it. If the compiler could fuse operations freely, code compiled
 twice could give results that differ in the last bits.
@@ -26,10 +25,7 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
-from walkerlab.physics.kernels import dispatch_by_type, kernel_part
-from walkerlab.physics.solvers import dop853_tableau as tableau
-from walkerlab.physics.solvers.dop853_tableau import nonzero
-from walkerlab.physics.solvers.events import FALLING, NO_CROSSING, CrossingFinder, crossing_of_piece, divide_out_zero
+from walkerlab.physics.kernels import dispatch_by_type
 from walkerlab.physics.solvers.system import State
 
 WIDTH = 8  # doubles in a register of AVX-512
@@ -210,7 +206,7 @@ def _row_pointer(context: Any, builder: Any, array_type: Any, array: Any, row: A
 
 
 @intrinsic
-def load_lanes(context: Any, array: Any, row: Any) -> Any:
+def load(context: Any, array: Any, row: Any) -> Any:
     """Load row `row` of a contiguous array (rows, WIDTH)."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
@@ -221,7 +217,7 @@ def load_lanes(context: Any, array: Any, row: Any) -> Any:
 
 
 @intrinsic
-def store_lanes(context: Any, value: Any, array: Any, row: Any) -> Any:
+def store(context: Any, value: Any, array: Any, row: Any) -> Any:
     """Store lanes in row `row` of a contiguous array (rows, WIDTH)."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
@@ -251,119 +247,6 @@ infer_global(fused, types.Function(_OneRounding))
 @lower_builtin(fused, types.Any, types.Any, types.Any)
 def _multiply_add(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
     return multiply_add(builder, *arguments)
-
-
-Jet = tuple[float, float, float]
-"""A value with its first two derivatives in time."""
-Quintic = tuple[float, float, float, float, float, float]
-"""Bernstein coefficients of a quintic polynomial over a step."""
-# Newton stops below this fraction of the step. Its error is about the square of its last move.
-LAST_MOVE = 1e-4
-MAX_ITERATIONS = 50
-
-
-@kernel_part
-def hermite(h: float, start: Jet, end: Jet) -> Quintic:
-    """Return the quintic over a step of h (s) with the given values and derivatives at both ends."""
-    # In Bernstein form of degree 5, the first difference is h f' / 5 and the second h^2 f'' / 20.
-    slope = 0.2 * h * start[1]
-    bend = 0.05 * h * h * start[2]
-    last_slope = 0.2 * h * end[1]
-    last_bend = 0.05 * h * h * end[2]
-    return (
-        start[0],
-        start[0] + slope,
-        start[0] + 2.0 * slope + bend,
-        end[0] - 2.0 * last_slope + last_bend,
-        end[0] - last_slope,
-        end[0],
-    )
-
-
-@kernel_part
-def evaluate_quintic(quintic: Quintic, x: float) -> float:
-    return value_and_slope(power_coefficients(quintic), x)[0]
-
-
-@kernel_part
-def power_coefficients(quintic: Quintic) -> Quintic:
-    b0, b1, b2, b3, b4, b5 = quintic
-    return (
-        b0,
-        5.0 * (b1 - b0),
-        10.0 * (b2 - 2.0 * b1 + b0),
-        10.0 * (b3 - b0 + 3.0 * (b1 - b2)),
-        5.0 * (b4 + b0 - 4.0 * (b3 + b1) + 6.0 * b2),
-        b5 - b0 + 5.0 * (b1 - b4) + 10.0 * (b3 - b2),
-    )
-
-
-@kernel_part
-def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
-    c0, c1, c2, c3, c4, c5 = powers
-    value = c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
-    slope = c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * (5.0 * c5))))
-    return value, slope
-
-
-@kernel_part
-def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
-    """Find the fraction of the step, above `after`, at which a quintic first falls through zero, or NO_CROSSING."""
-    # Coefficients of one sign prove that there is no crossing. A single change from positive to negative proves that
-    # there is exactly one. `crossing_of_piece` handles all other cases.
-    changes = 0
-    for i in range(1 if zero_at_start else 0, 5):
-        changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)
-    if changes == 0:
-        return NO_CROSSING
-    # `only_crossing` starts from the end of the step and knows neither `after` nor a zero at the start.
-    if changes == 1 and not zero_at_start and after == 0.0:
-        return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
-    for i in range(6):
-        finder.stack[0, i] = quintic[i]
-    size = divide_out_zero(finder.stack, 6) if zero_at_start else 6
-    return crossing_of_piece(finder, size, FALLING, after)
-
-
-@kernel_part
-def only_crossing(quintic: Quintic) -> float:
-    """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
-    powers = power_coefficients(quintic)
-    low = 0.0
-    high = 1.0
-    x = 1.0
-    for _ in range(MAX_ITERATIONS):
-        value, slope = value_and_slope(powers, x)
-        if value < 0.0:
-            high = x
-        else:
-            low = x
-        # Where the quintic does not fall, Newton would leave the bracket. `low` is not inside it either, so bisection
-        # follows.
-        new = x - value / slope if slope < 0.0 else low
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        x, change = new, abs(new - x)
-        if change < LAST_MOVE:
-            break
-    return x
-
-
-LANE_NODES = tableau.NODES
-A_2 = nonzero(tableau.A_2)
-A_3 = nonzero(tableau.A_3)
-A_4 = nonzero(tableau.A_4)
-A_5 = nonzero(tableau.A_5)
-A_6 = nonzero(tableau.A_6)
-A_7 = nonzero(tableau.A_7)
-A_8 = nonzero(tableau.A_8)
-A_9 = nonzero(tableau.A_9)
-A_10 = nonzero(tableau.A_10)
-A_11 = nonzero(tableau.A_11)
-A_12 = nonzero(tableau.A_12)
-A_13 = nonzero(tableau.A_13)
-LANE_ERROR_5 = nonzero(tableau.ERROR_5)
-LANE_ERROR_3 = nonzero(tableau.ERROR_3)
 
 
 @dispatch_by_type
@@ -411,37 +294,3 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
         return context.make_tuple(builder, signature.return_type, moved)
 
     return y(y, y.dtype, weights, vectors), generate
-
-
-@kernel_part
-def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
-    """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
-    # Written out, because in compiled code tuples of different lengths are different types: no loop can extend them.
-    k2 = derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, A_2, (k1,)))
-    k3 = derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, A_3, (k1, k2)))
-    k4 = derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, A_4, (k1, k3)))
-    k5 = derivative(system, t + LANE_NODES[4] * h, stage_state(y, h, A_5, (k1, k3, k4)))
-    k6 = derivative(system, t + LANE_NODES[5] * h, stage_state(y, h, A_6, (k1, k4, k5)))
-    k7 = derivative(system, t + LANE_NODES[6] * h, stage_state(y, h, A_7, (k1, k4, k5, k6)))
-    k8 = derivative(system, t + LANE_NODES[7] * h, stage_state(y, h, A_8, (k1, k4, k5, k6, k7)))
-    k9 = derivative(system, t + LANE_NODES[8] * h, stage_state(y, h, A_9, (k1, k4, k5, k6, k7, k8)))
-    k10 = derivative(system, t + LANE_NODES[9] * h, stage_state(y, h, A_10, (k1, k4, k5, k6, k7, k8, k9)))
-    k11 = derivative(system, t + LANE_NODES[10] * h, stage_state(y, h, A_11, (k1, k4, k5, k6, k7, k8, k9, k10)))
-    k12 = derivative(system, t + h, stage_state(y, h, A_12, (k1, k4, k5, k6, k7, k8, k9, k10, k11)))
-    needed = (k1, k6, k7, k8, k9, k10, k11, k12)
-    y_new = stage_state(y, h, A_13, needed)
-    return needed, y_new, derivative(system, t + h, y_new)
-
-
-@kernel_part
-def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Compute, for each error estimate, the sum of squares of error over tolerance. `method` holds rtol and atol."""
-    error_5 = 0.0
-    error_3 = 0.0
-    for i in range(len(y)):
-        scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))
-        relative_5 = by_order_5[i] * scale
-        relative_3 = by_order_3[i] * scale
-        error_5 += relative_5 * relative_5
-        error_3 += relative_3 * relative_3
-    return error_5, error_3

@@ -17,21 +17,6 @@ from walkerlab.physics.kernels import kernel_part, pass_by_reference
 from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.lanes import fused
 from walkerlab.physics.solvers.linear import factor, reciprocal, solve
-from walkerlab.physics.solvers.stepping import (
-    ACCEPTED,
-    BUDGET,
-    H_NEXT,
-    JACOBIANS,
-    OUT_OF_BUDGET,
-    REJECTED,
-    RHS,
-    SMALLEST_STEP,
-    STEP_DONE,
-    STEP_TOO_SMALL,
-    T_OLD,
-    T,
-    new_counts,
-)
 from walkerlab.physics.solvers.system import derivative, jacobian
 
 
@@ -113,13 +98,7 @@ FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
 
 # indices into `control`
-H_FACTORED = 0
-H_OLD = 1
-ERROR_OLD = 2
-RATE = 3
-SMOOTH = 4
-FRESH = 5
-UNKNOWNS = 6
+H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = range(7)
 
 
 @pass_by_reference
@@ -151,7 +130,7 @@ def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
     three = (3, n)
     square = (n, n)
     return Radau5(
-        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), new_counts(budget), np.zeros(n), np.zeros((2, n)),
+        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), stepping.new_counts(budget), np.zeros(n), np.zeros((2, n)),
         np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
         np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
         np.zeros(n), np.zeros(n, np.complex128), np.zeros(7),
@@ -209,7 +188,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
         for i in range(n):
             method.at[i] = y[i] + z[stage, i]
         derivative(system, t + RADAU_NODES[stage] * h, method.at, f[stage])
-    method.counts[RHS] += 3
+    method.counts[stepping.RHS] += 3
     real = method.move
     for i in range(n):
         f1 = f[0, i]
@@ -273,11 +252,11 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
     """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
     clock = method.clock
     control = method.control
-    clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
+    clock[stepping.T_OLD], clock[stepping.T], clock[stepping.H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
     for i in range(method.y.size):
         method.y[i] = y[i]
     derivative(system, t, method.y, method.slope[0])
-    method.counts[RHS] += 1
+    method.counts[stepping.RHS] += 1
     refresh(method, system)
     control[H_OLD], control[RATE], control[SMOOTH] = 0.0, 1.0, 0.0
 
@@ -297,7 +276,7 @@ def step_error(method: Radau5, system: Any, t: float, h: float, filtered: bool) 
         for i in range(n):
             method.at[i] = method.y[i] + error[i]
         derivative(system, t, method.at, error)
-        method.counts[RHS] += 1
+        method.counts[stepping.RHS] += 1
         for i in range(n):
             error[i] += method.f[1, i]
         solve_real(method, error)
@@ -321,11 +300,11 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     """Advance by one step, with Hairer's predictive step control."""
     clock = method.clock
     control = method.control
-    t, h = clock[T], clock[H_NEXT]
+    t, h = clock[stepping.T], clock[stepping.H_NEXT]
     rejected = False
-    while method.counts[RHS] < method.counts[BUDGET]:
-        if h <= SMALLEST_STEP * max(abs(t), 1e-3):
-            return STEP_TOO_SMALL
+    while method.counts[stepping.RHS] < method.counts[stepping.BUDGET]:
+        if h <= stepping.SMALLEST_STEP * max(abs(t), 1e-3):
+            return stepping.STEP_TOO_SMALL
         # stretch a step that nearly reaches the end, rather than leave a tiny one
         last = t + 1.0001 * h >= t_end
         if last:
@@ -333,7 +312,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
         fine = control[H_FACTORED] == h or factor_matrices(method, h)
         iterations = solve_stages(method, system, t, h) if fine else 0
         if iterations == 0:
-            method.counts[REJECTED] += 1
+            method.counts[stepping.REJECTED] += 1
             control[SMOOTH] = 0.0
             # An old Jacobian may be to blame, and a new one costs less than a shorter step.
             if control[FRESH] == 0.0:
@@ -349,20 +328,20 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
         if error < 1.0:
             accept(method, system, t, t_end if last else t + h)
             h_new = next_step(method, h, error, shrink, safety)
-            clock[H_NEXT] = max(h_new, clock[H_NEXT]) if last else h_new
-            return STEP_DONE
-        method.counts[REJECTED] += 1
+            clock[stepping.H_NEXT] = max(h_new, clock[stepping.H_NEXT]) if last else h_new
+            return stepping.STEP_DONE
+        method.counts[stepping.REJECTED] += 1
         rejected = True
         h /= shrink
         control[SMOOTH] = 0.0
-    return OUT_OF_BUDGET
+    return stepping.OUT_OF_BUDGET
 
 
 @kernel_part
 def refresh(method: Radau5, system: Any) -> None:
     """Evaluate the Jacobian at the step's start."""
-    jacobian(system, method.clock[T], method.y, method.J)
-    method.counts[JACOBIANS] += 1
+    jacobian(system, method.clock[stepping.T], method.y, method.J)
+    method.counts[stepping.JACOBIANS] += 1
     method.control[FRESH], method.control[H_FACTORED] = 1.0, 0.0
     method.control[UNKNOWNS] = unknowns(method.J)
 
@@ -399,9 +378,9 @@ def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
         method.y_old[i], slope[1, i] = y[i], slope[0, i]
         y[i] += z[2, i]
     derivative(system, t_new, y, slope[0])
-    method.counts[RHS] += 1
-    method.counts[ACCEPTED] += 1
-    clock[T_OLD], clock[T] = t, t_new
+    method.counts[stepping.RHS] += 1
+    method.counts[stepping.ACCEPTED] += 1
+    clock[stepping.T_OLD], clock[stepping.T] = t, t_new
     control[SMOOTH] = 1.0
     control[FRESH] = 0.0
     if control[RATE] > FRESH_RATE:
@@ -415,7 +394,7 @@ def rewind_radau5(method: Radau5, system: Any) -> None:
     control = method.control
     for i in range(method.y.size):
         method.y[i], method.slope[0, i] = method.y_old[i], method.slope[1, i]
-    clock[T] = clock[T_OLD]
+    clock[stepping.T] = clock[stepping.T_OLD]
     refresh(method, system)
     control[SMOOTH], control[H_OLD] = 0.0, 0.0
 

@@ -11,19 +11,6 @@ import numpy as np
 
 from walkerlab.physics.kernels import kernel
 from walkerlab.physics.solvers import stepping
-from walkerlab.physics.solvers.stepping import (
-    ACCEPTED,
-    BUDGET,
-    H_NEXT,
-    JACOBIANS,
-    OUT_OF_BUDGET,
-    RHS,
-    STEP_DONE,
-    STEP_TOO_SMALL,
-    T_OLD,
-    T,
-    new_counts,
-)
 from walkerlab.physics.solvers.system import Integers, derivative, jacobian
 
 DENSE_DEGREE = 7
@@ -65,7 +52,7 @@ class ScipyMethod:
         self.clock = np.zeros(3)
         self.y_old = np.zeros(n)
         self.y = np.zeros(n)
-        self.counts = new_counts(budget)
+        self.counts = stepping.new_counts(budget)
         self.solver: Any = None
         self.dense: Any = None
 
@@ -76,9 +63,9 @@ def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any]
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
 
     def fun(t: float, y: Any) -> Any:
-        if counts[RHS] >= counts[BUDGET]:
+        if counts[stepping.RHS] >= counts[stepping.BUDGET]:
             raise OutOfBudgetError
-        counts[RHS] += 1
+        counts[stepping.RHS] += 1
         dy = np.empty(n)
         # The machine code is compiled for contiguous arrays.
         code(system, t, np.ascontiguousarray(y), dy)
@@ -91,7 +78,7 @@ def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[flo
     code = entry_point(jacobian_matrix, system, 0.0, np.zeros(n), np.zeros((n, n)))
 
     def jac(t: float, y: Any) -> Any:
-        method.counts[JACOBIANS] += 1
+        method.counts[stepping.JACOBIANS] += 1
         J = np.empty((n, n))
         code(system, t, y, J)
         return J
@@ -103,7 +90,7 @@ def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[flo
 def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
     n = method.y.size
     method.y[:] = y
-    method.clock[T_OLD] = method.clock[T] = t
+    method.clock[stepping.T_OLD] = method.clock[stepping.T] = t
     # SciPy warns about a smaller relative tolerance and replaces it.
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
     if method.takes_jacobian:
@@ -120,40 +107,40 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
 def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
     """Take the rest of the solver's last step if it was cut short or rewound, otherwise its next step."""
     clock = method.clock
-    if method.dense is None or method.solver.t <= clock[T]:
+    if method.dense is None or method.solver.t <= clock[stepping.T]:
         status = step_solver(method)
-        if status != STEP_DONE:
+        if status != stepping.STEP_DONE:
             return status
     solver = method.solver
-    clock[T_OLD], clock[T] = clock[T], min(solver.t, t_end)
+    clock[stepping.T_OLD], clock[stepping.T] = clock[stepping.T], min(solver.t, t_end)
     method.y_old[:] = method.y
-    method.y[:] = solver.y if clock[T] == solver.t else method.dense(clock[T])
-    return STEP_DONE
+    method.y[:] = solver.y if clock[stepping.T] == solver.t else method.dense(clock[stepping.T])
+    return stepping.STEP_DONE
 
 
 def step_solver(method: ScipyMethod) -> int:
     """Take one step, whose size the solver chooses, and return a status as `advance` does."""
     if method.solver is None:
-        return OUT_OF_BUDGET
+        return stepping.OUT_OF_BUDGET
     try:
         # a trial step may overflow; the library then takes a shorter one
         with np.errstate(over="ignore", invalid="ignore"):
             method.solver.step()
         if method.solver.status == "failed":
-            return STEP_TOO_SMALL
+            return stepping.STEP_TOO_SMALL
         # dense output may evaluate the right-hand side and exhaust the budget
         method.dense = method.solver.dense_output()
     except OutOfBudgetError:
-        return OUT_OF_BUDGET
-    method.counts[ACCEPTED] += 1
-    method.clock[H_NEXT] = method.solver.t - method.solver.t_old
-    return STEP_DONE
+        return stepping.OUT_OF_BUDGET
+    method.counts[stepping.ACCEPTED] += 1
+    method.clock[stepping.H_NEXT] = method.solver.t - method.solver.t_old
+    return stepping.STEP_DONE
 
 
 @stepping.rewind.case(ScipyMethod)
 def rewind_scipy(method: ScipyMethod, system: Any) -> None:
     """Go back to the start of the step, but keep its dense output, which `advance` evaluates at the event."""
-    method.clock[T] = method.clock[T_OLD]
+    method.clock[stepping.T] = method.clock[stepping.T_OLD]
     method.y[:] = method.y_old
 
 
@@ -164,14 +151,14 @@ def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
 
 @stepping.interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
-    t_old = method.clock[T_OLD]
-    t = method.clock[T]
+    t_old = method.clock[stepping.T_OLD]
+    t = method.clock[stepping.T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
 @stepping.sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
-    t_old = method.clock[T_OLD]
-    t = method.clock[T]
+    t_old = method.clock[stepping.T_OLD]
+    t = method.clock[stepping.T]
     columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
     states[: len(fractions), : len(columns)] = columns.T

@@ -17,19 +17,11 @@ from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_defa
 from walkerlab.physics.solvers.system import Integers
 
 # indices into `clock`
-T_OLD = 0
-T = 1
-H_NEXT = 2
+T_OLD, T, H_NEXT = range(3)
 # indices into `counts`
-RHS = 0
-ACCEPTED = 1
-REJECTED = 2
-JACOBIANS = 3
-BUDGET = 4
+RHS, ACCEPTED, REJECTED, JACOBIANS, BUDGET = range(5)
 # results of `advance`
-STEP_DONE = 0
-OUT_OF_BUDGET = 1
-STEP_TOO_SMALL = 2
+STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = range(3)
 SMALLEST_STEP = 1e-15
 
 

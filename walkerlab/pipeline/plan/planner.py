@@ -60,7 +60,7 @@ class Planner:
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
                 step = self._judge(self.graph[name], force=False)
-                # Nothing takes over an optional result from another folder.
+                # An optional result in another folder is not copied here, so only one in this folder counts.
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
                 elif step.damaged:

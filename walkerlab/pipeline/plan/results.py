@@ -17,7 +17,7 @@ from walkerlab.extensions import WORDS, declared, extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store import artifact, provenance
-from walkerlab.pipeline.store.artifact import Identity, Stored, Verdict, broken_file, changed_parts
+from walkerlab.pipeline.store.artifact import Identity, Lookup, Stored, broken_file, changed_parts
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import Checkpoint, replacing
 from walkerlab.pipeline.store.provenance import Provenance
@@ -173,7 +173,7 @@ class FolderResults:
         checkpoint.forget()
         return stored
 
-    def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
+    def _why_outdated(self, stage: Stage, identity: Identity, verdict: Lookup, inputs: Mapping[str, Content]) -> str:
         """Return the reason why a stage has to run, or '' if its result is current."""
         stored = verdict.artifact
         if not verdict.accepted or stored is None:
@@ -191,7 +191,10 @@ def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]
 
 
 def input_digest(stage: Stage, result: Content) -> str:
-    """Return the digest of an input that a result records. For drawings, which show timings, it covers the file."""
+    """Return the digest of an input, as recorded in a result.
+
+    Drawings also show run times, so for them it covers the whole file.
+    """
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 

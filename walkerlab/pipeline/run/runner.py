@@ -192,7 +192,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target if it has no answer, otherwise of the first stage without one, or else None.
+    """Return the error of the target or, if it has an answer, of the first stage that has none. None if all have one.
 
     message  message and advice of the target's error; None if it has an answer
     """

@@ -136,7 +136,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
+    from walkerlab.scene.contact import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps

@@ -152,8 +152,8 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
         raise ConfigError(
-            f"{block.data} is of {recording.levelled_by}, which levels the floor: the slope turns the angles.",
-            "State --camera-tilt floor, or --camera-tilt 0 if its floor_angle was 0.",
+            f"{block.data} is from {recording.levelled_by}, which makes the floor level: the slope turns the angles.",
+            "Give --camera-tilt floor, or --camera-tilt 0 if the recording's floor_angle was 0.",
             ("identify", "camera_tilt_deg"),
         )
     walk = mend_angles(as_walk(recording, block, slope_rad), block.data)

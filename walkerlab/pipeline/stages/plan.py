@@ -1,21 +1,38 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, Final, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.config.analyses import Plan
 from walkerlab.config.identify import Identify
 from walkerlab.config.reads import PlanConfig
 from walkerlab.config.schema import Config
-from walkerlab.errors import ConfigError
+from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.physics.estimation.fit import linearise
+from walkerlab.physics.estimation.information import information_from, open_combinations
+from walkerlab.physics.estimation.measurements import (
+    LEG_ANGLE,
+    STEP_LENGTH,
+    STEP_PERIOD,
+    MeasuredWalk,
+    split_into_steps,
+)
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
+from walkerlab.physics.estimation.prediction import DELAY, Forecast
+from walkerlab.physics.estimation.result import Unidentifiable
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.measurement_plan import WayToMeasure, plan_measurements
+from walkerlab.scene.identification import ConfigFamily, problem_of, step_map_of
 from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 
@@ -102,3 +119,149 @@ def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
             ),
         }
     )
+
+
+STEP_MEASUREMENTS: Final = {
+    "periods": (STEP_PERIOD,),
+    "periods and lengths": (STEP_PERIOD, STEP_LENGTH),
+    "periods, lengths and touch angles": (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE),
+}
+ANGLES: Final = "angles over time"
+SHORTER_WALK: Final = "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change)."
+AT_GAIT = "at the gait"
+OFF_GAIT = "off the gait"
+CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
+"""Numbers of steps at which errors are listed."""
+
+
+@dataclass(frozen=True)
+class WayToMeasure:
+    """A way to measure a walk, and the parameter errors that would remain."""
+
+    measurement: str
+    start: str
+    errors: dict[str, float | None]  # standard error of each key, in its unit; None if the walk does not determine it
+    not_identifiable: tuple[Unidentifiable, ...]
+    # steps needed to reach the target error of each key; None if the longest walk is too short
+    steps_needed: dict[str, int | None]
+    curve: dict[int, dict[str, float | None]]  # errors by number of steps
+
+
+def plan_measurements(
+    config: Config,
+    gait: Mapping[str, Any],
+    question: Identify,
+    plan: Plan,
+    note: Callable[[str], None] = lambda _: None,
+) -> tuple[WayToMeasure, ...]:
+    """Compute the parameter errors that would remain after each way of measuring a walk, simple ways first.
+
+    gait  summary of `fixedpoint` for the config
+    note  receives messages
+
+    Raises NoAnswer if the model's walk ends early, ConfigError for keys that are not parameters.
+    """
+    subject = find_model_gait(question.model, config, gait, note)
+    options = []
+    for start, change in ((AT_GAIT, 0.0), (OFF_GAIT, plan.start_change)):
+        moved = replace(subject, z=subject.z * (1.0 + change))
+        of_steps, of_angles = (walk_of(moved, each, question) for each in predict_measured(moved, question, plan))
+        for measurement, quantities in (*STEP_MEASUREMENTS.items(), (ANGLES, (LEG_ANGLE,))):
+            walk = of_angles if measurement == ANGLES else of_steps
+            errors_after = partial(expected_errors, walk, quantities, question.keys, plan)
+            counts = {*(count for count in CURVE if count <= plan.max_steps), plan.max_steps}
+            needed = {key: steps_for(key, error, errors_after, plan.max_steps) for key, error in plan.errors.items()}
+            curve = {count: errors_after(count)[0] for count in sorted(counts)}
+            options.append(WayToMeasure(measurement, start, *errors_after(plan.steps), needed, curve))
+    return tuple(options)
+
+
+Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
+
+
+def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredWalk, MeasuredWalk]:
+    """Predict the measurements of a walk from the subject's state z.
+
+    Raises NoAnswer if the walk ends early.
+    """
+    family = ConfigFamily(subject.config, question.keys)
+    walks = step_map_of(subject, family)
+    # One step more than is measured: samples must lie before the last heel strike of a walk.
+    level = np.zeros(plan.max_steps + 2)
+    walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
+    if walk.durations_s.size <= plan.max_steps:
+        raise NoAnswer(
+            f"the {subject.model} model takes only {walk.durations_s.size} of {plan.max_steps + 1} steps.",
+            SHORTER_WALK,
+        )
+    steps = slice(plan.max_steps)
+    touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
+    times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
+    angles = walks.sample_legs(subject.z, family.start, level, times)  # type: ignore[arg-type]
+    quantities = walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps]
+    of_steps = MeasuredWalk(*quantities, first_leg=subject.first_leg)
+    return of_steps, replace(split_into_steps(times, angles, touches), first_leg=subject.first_leg)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedWalk:
+    """Predicted walk that has not been measured, with its derivatives."""
+
+    forecast: Forecast
+    data: Linearised
+    step: NDArray[np.int64]  # (values,) index of each value's step
+
+
+def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> PlannedWalk:
+    """Return the planned walk with its derivatives.
+
+    Raises NoAnswer if a slightly changed walk ends early.
+    """
+    problem = problem_of(subject, measured, question)
+    if measured.sampled:
+        # `identify` always fits a delay to angles at their sample times.
+        nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
+        problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
+    forecast = problem.forecast
+    data = linearise(problem, problem.initial_unknowns(), np.zeros(forecast.heights), exact=True)
+    if data is None:
+        raise NoAnswer(
+            f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
+            SHORTER_WALK,
+        )
+    steps = np.tile(np.arange(measured.count), len(forecast.channels))
+    return PlannedWalk(forecast, data, np.append(steps, np.repeat(measured.step, 2)))
+
+
+def expected_errors(
+    walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
+) -> Errors:
+    """Return the errors that remain after measuring these quantities of the first steps, and the open combinations."""
+    noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
+    data = walk.data
+    quantities = walk.forecast.quantities
+    rows = np.isin(data.quantity, [quantities.index(name) for name in measured]) & (walk.step < steps)
+    seen = replace(data, residuals=data.residuals[rows], J=data.J[rows], G=data.G[rows], quantity=data.quantity[rows])
+    deviations = Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)
+    whole = evaluate(reduce(seen), deviations).information
+    information = information_from(whole, keys, walk.forecast.scales, int(np.count_nonzero(rows)))
+    combinations, left_open = open_combinations(information)
+    errors = zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True)
+    return {key: None if key in left_open else error for key, error in errors}, combinations
+
+
+def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:
+    """Return the smallest number of steps that reduces the error of a key to `wanted`, or None if above `most`."""
+
+    def suffices(count: int) -> bool:
+        error = errors_after(count)[0].get(key)
+        return error is not None and error <= wanted
+
+    if not suffices(most):
+        return None
+    # More steps never increase an error.
+    low, high = 0, most
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if suffices(middle) else (middle, high)
+    return high

@@ -45,13 +45,14 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     assert block is not None, "the stage requires the block"
     progress.start("recorded-walk", 1)
     walk = read_walk(block, config.slope_rad)
+    model = rigid_walker(config)
     if block.camera_tilt_deg == "free":
-        walk = correct_tilt(walk, rigid_walker(config))
+        walk = correct_tilt(walk, model)
     doubts = list(doubts_about(walk))
     # Doubts are reported before the division into steps, which may fail because of noise.
     for doubt in doubts:
         progress.note(doubt)
-    steps = divide_into_steps(walk, rigid_walker(config), block.file)
+    steps = divide_into_steps(walk, model, block.file)
     for doubt in steps.doubts:
         progress.note(doubt)
     progress.advance()

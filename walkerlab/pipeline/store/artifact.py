@@ -114,8 +114,8 @@ class Stored(Identified):
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Verdict on whether a file is the artifact with a given key."""
+class Lookup:
+    """Whether a file is the artifact with a given key, and why not."""
 
     accepted: bool
     reason: str  # reason for rejecting it; empty if accepted
@@ -206,23 +206,23 @@ def read(path: Path) -> Stored:
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
-def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
+def check(path: Path, key: str | None = None, stage: str | None = None) -> Lookup:
     """Check that the file at `path` is intact and belongs to `key` and `stage`, if these are given. This
     never raises.
     """
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
-        return Verdict(False, NOT_THERE)
+        return Lookup(False, NOT_THERE)
     except OtherLayout as error:
-        return Verdict(False, str(error))
+        return Lookup(False, str(error))
     except Damaged as error:
-        return Verdict(False, f"damaged: {error}", damaged=True)
+        return Lookup(False, f"damaged: {error}", damaged=True)
     if stage not in (None, artifact.identity.stage):
-        return Verdict(False, f"damaged: it is a result of {artifact.identity.stage}, not of {stage}", damaged=True)
+        return Lookup(False, f"damaged: it is a result of {artifact.identity.stage}, not of {stage}", damaged=True)
     if key not in (None, artifact.identity.key):
-        return Verdict(False, "made for another key", artifact)
-    return Verdict(True, "", artifact)
+        return Lookup(False, "made for another key", artifact)
+    return Lookup(True, "", artifact)
 
 
 def root_attributes(content: Content, identity: Identity, provenance: Provenance, digest: str) -> dict[str, Attribute]:

@@ -263,8 +263,9 @@ class SlurmQueue:
 
 
 def private_jobs_folder(run_folder: Path) -> Path:
-    """Create a folder for pickled jobs and results, or close it to other users, because pickles run code when they are
-    loaded.
+    """Create a folder for pickled jobs and results that only this user can open, or close an existing one to others.
+
+    Loading a pickle runs its code.
 
     Raises ConfigError if other users may replace it, StorageError if it cannot be created or closed.
     """

@@ -33,7 +33,7 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.figures.style import EXPORT_DPI
 from walkerlab.views.report.tables import Table, as_csv, record_table
-from walkerlab.views.report.tex import as_tex
+from walkerlab.views.report.tex import COLUMN_WIDTHS, as_tex
 from walkerlab.views.report.words import MODEL_NAMES
 
 if TYPE_CHECKING:
@@ -42,11 +42,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """Destination of an export."""
+    """Destination and size of an export."""
 
     to: str | None  # format, or file name if `output` is None
     output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
+    columns: int = 1  # journal columns that a figure or a table for LaTeX spans
+    width: float | None = None  # width (pt) of a figure; None for that of the columns
+    dpi: int = EXPORT_DPI  # pixels per inch of a figure
 
     def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
         """Return file and format (default: first of `kinds`).
@@ -116,21 +119,8 @@ def run_to_export(run: str, request: Request) -> RunFolder:
     return folder
 
 
-def export_from(
-    folder: RunFolder,
-    what: str,
-    target: Target,
-    width: float,
-    model: str,
-    console: Console,
-    dpi: int = EXPORT_DPI,
-    columns: int = 1,
-) -> Path:
+def export_from(folder: RunFolder, what: str, target: Target, model: str, console: Console) -> Path:
     """Write an item of a run to a file and return its path.
-
-    width    width (pt) of a figure
-    dpi      pixels per inch of a figure
-    columns  journal columns that a table for LaTeX spans
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
@@ -138,7 +128,7 @@ def export_from(
         what = f"figure-{int(numbered[1]):02d}"
     make: Callable[[str], bytes]
     kinds: Sequence[str]
-    writers: dict[str, Callable[[Table], bytes]] = {"csv": as_csv, "tex": partial(as_tex, columns=columns)}
+    writers: dict[str, Callable[[Table], bytes]] = {"csv": as_csv, "tex": partial(as_tex, columns=target.columns)}
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what == STEPS:
@@ -148,7 +138,7 @@ def export_from(
     elif isinstance(item := find_item(folder, what), Table):
         stem, kinds, make = hyphenate(what), tuple(writers), lambda kind: writers[kind](item)
     else:
-        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, (width, dpi), console)
+        stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, target, console)
     path, kind = target.choose_file(what, f"{folder.name}-{stem}", kinds)
     return write_file(path, make(kind), console)
 
@@ -236,10 +226,8 @@ def plan_run(folder: RunFolder) -> Planner:
     return planner
 
 
-def figure(
-    folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
-) -> bytes:
-    """Draw a figure as on the page. `size` holds the width (pt) and the pixels per inch.
+def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
+    """Draw a figure as on the page, with the target's size.
 
     Raises StaleError if its results are missing.
     """
@@ -264,7 +252,7 @@ def figure(
             f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} recomputes them."
         )
     with refusing_older(folder, outdated):
-        return illustration.as_file(inputs, kind, *size)
+        return illustration.as_file(inputs, kind, target.width or COLUMN_WIDTHS[target.columns], target.dpi)
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
@@ -351,10 +339,12 @@ class Film:
 
 BOTH = "both"
 """Name of a film that shows both models in one picture."""
+MAX_GIF_RATE = 50
+"""Browsers show a picture of less than 20 ms for 100 ms."""
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return `model` or, if None, contact-sim (simulate if only that has run).
+    """Return `model`. If it is None, choose contact-sim, or simulate if only that has run.
 
     Raises ConfigError if `model` does not walk.
     """
@@ -374,6 +364,8 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     ffmpeg = shutil.which("ffmpeg")
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
+    if kind == "gif" and film.rate > MAX_GIF_RATE:
+        raise ConfigError(f"browsers slow a GIF above {MAX_GIF_RATE} frames per second.", "Lower --rate, or use .mp4.")
     # Imported here: a file that cannot be written is refused before drawing code is loaded.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
@@ -406,8 +398,10 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
+    # A GIF counts hundredths of a second. Rounded ends of pictures keep the whole film in time.
+    durations_ms = 10 * np.diff(np.round(100 * np.arange(len(frames) + 1) / rate)).astype(int)
     file = io.BytesIO()
-    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
+    frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=durations_ms.tolist(), loop=0)
     return file.getvalue()
 
 

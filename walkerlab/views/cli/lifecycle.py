@@ -18,15 +18,8 @@ RunArgument = Annotated[
 ITEM_EXAMPLES = (
     "figure-07 or 7, steps, trajectory, model, or a table by its caption; any other word lists the run's items"
 )
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="File to write; its ending gives the format. Default: named after the run or the config, in this folder.",
-    ),
-]
+OUTPUT_HELP = "File to write; its ending gives the format. Default: named after the run or the config, in this folder."
+Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help=OUTPUT_HELP)]
 FIRST_WALK = "default: contact-sim, or simulate if that has not run"
 
 
@@ -118,9 +111,7 @@ def export(
         # Imported here: only this export needs a walker.
         from walkerlab.views.cli.models import write_model
 
-        how = slope or "gravity"
-        paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings, how)
-        for path in paths:
+        for path in write_model(run, request, Target(to, output), law, slope or "gravity"):
             print(path)
         return
     if slope is not None:
@@ -128,12 +119,10 @@ def export(
     if request.sets:
         raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
     from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
-    from walkerlab.views.report.tex import COLUMN_WIDTHS
 
     folder = run_to_export(run, request)
-    points = width or COLUMN_WIDTHS[columns]
-    whose = walk_in(folder, model)
-    print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
+    target = Target(to, output, columns=columns, width=width, dpi=dpi)
+    print(export_from(folder, what, target, walk_in(folder, model), request.console))
 
 
 def draw(

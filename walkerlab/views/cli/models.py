@@ -1,6 +1,5 @@
 """`walkerlab export RUN model`: a run's walker with the start of its gait, for ADAMS and MuJoCo."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,27 +11,21 @@ from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.provenance import git_commit
-from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Target, write_file
+from walkerlab.views.cli.request import Request
 
 
 def write_model(
-    run: str,
-    runs: Path,
-    target: Target,
-    law: str | None,
-    console: Console,
-    sets: Sequence[str] = (),
-    slope: str = "gravity",
+    run: str, request: Request, target: Target, law: str | None = None, slope: str = "gravity"
 ) -> list[Path]:
     """Write a model of a run's or config's walker, computing its gait first if necessary, and return the files written.
 
-    sets   changes of the config, KEY=VALUE
     slope  what is tilted in a model for MuJoCo: gravity, or the geometry
 
     Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
     """
-    resolved = resolve(run, sets, runs=runs)
+    resolved = resolve(run, request.settings, runs=request.runs)
+    console = request.console
     config = resolved.loaded.config
     folder = resolved.folder
     for warning in resolved.loaded.warnings:

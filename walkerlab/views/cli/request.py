@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -84,6 +84,10 @@ def option(*flags: str, default: Any = None, **about: Any) -> Any:
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
+switch = partial(option, default=False)
+"""Declare a field that is an option without a value."""
+
+
 @dataclass(frozen=True)
 class Request:
     """Options shared by commands. Options that a command does not offer keep their defaults."""
@@ -92,9 +96,7 @@ class Request:
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     graph: Graph = PIPELINE  # the stages of the program
-    full: bool = option(
-        "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
-    )
+    full: bool = switch("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
     config: str | None = option(
         "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
         help="Config file, built-in config, or run by its name or folder; default: paper.",
@@ -110,16 +112,14 @@ class Request:
     jobs: int | None = option(
         "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
-    force: bool = option("--force", default=False, help="Recompute the stage and all it needs, even if up to date.")
-    dry_run: bool = option("--dry-run", default=False, help="Show what would be done and why; change nothing.")
-    no_wait: bool = option(
-        "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
-    )
-    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it exists.")
-    every: bool = option("--all", default=False, help="Show all values, not only the headline values.")
-    as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
-    quiet: bool = option("--quiet", "-q", default=False, help="Show only warnings and errors.")
-    verbose: bool = option("--verbose", "-v", default=False, help="Show more messages.")
+    force: bool = switch("--force", help="Recompute the stage and all it needs, even if up to date.")
+    dry_run: bool = switch("--dry-run", help="Show what would be done and why; change nothing.")
+    no_wait: bool = switch("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
+    open_page: bool = switch("--open", help="Show the page in the browser as soon as it exists.")
+    every: bool = switch("--all", help="Show all values, not only the headline values.")
+    as_json: bool = switch("--json", help="Print one JSON object on stdout.")
+    quiet: bool = switch("--quiet", "-q", help="Show only warnings and errors.")
+    verbose: bool = switch("--verbose", "-v", help="Show more messages.")
 
     @cached_property
     def console(self) -> Console:
@@ -211,42 +211,37 @@ def exit_on_failure(request: Request) -> Iterator[None]:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
-    def print_failed(error: WalkerlabError) -> None:
-        """With `--json`, print an object that describes the failure."""
+    def fail(error: WalkerlabError) -> typer.Exit:
+        """Print a failure and, with `--json`, an object that describes it, and return the exit that it causes."""
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
             print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})
+        print_error(error, request.typed_for)
+        return typer.Exit(error.exit_code)
 
     try:
         yield
         # Otherwise an error of the output would appear at exit, as a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
-        print_failed(error)
-        print_error(error, request.typed_for)
-        raise typer.Exit(error.exit_code) from None
+        raise fail(error) from None
     except KeyboardInterrupt:
-        stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
-        print_failed(stopped)
-        print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
-        raise typer.Exit(stopped.exit_code) from None
+        advice = "Finished results are kept; the same command computes the rest."
+        raise fail(StoppedError("interrupted", advice)) from None
     except BrokenPipeError:
         discard_output()
         raise typer.Exit(0) from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
-            print_failed(too_long)
-            print_error(too_long)
-            raise typer.Exit(too_long.exit_code) from None
+            raise fail(too_long) from None
         # An error without a file name is one of the output.
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()
-        print_error(
-            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
-        )
+        lost = f"the output could not be written: {error.strerror}."
+        print_error(StorageError(lost, "The results themselves are stored."))
         raise typer.Exit(StorageError.exit_code) from None
 
 
@@ -275,7 +270,9 @@ def as_json(error: WalkerlabError, request: Request) -> dict[str, Any]:
 
 
 def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:
-    print(f"error: {error.message}", file=sys.stderr)
+    # A user who stops a command knows that this is no error.
+    lead = "" if isinstance(error, StoppedError) else "error: "
+    print(f"{lead}{error.message}", file=sys.stderr)
     if error.advice:
         print(f"advice: {add_run_options(error.advice, options_of)}", file=sys.stderr)
 

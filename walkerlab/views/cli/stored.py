@@ -70,10 +70,8 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         "current": error is None,
         "stages": rows,
     }
-    names = [step.stage.name for step in steps]
-    table = aligned(
-        [["stage", "state", "why"], *map(list, zip(names, map(state_of, steps), explain_states(steps), strict=True))]
-    )
+    texts = zip((step.stage.name for step in steps), map(state_of, steps), explain_states(steps), strict=True)
+    table = aligned([["stage", "state", "why"], *map(list, texts)])
     changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
     running = [f"running in {path}: {worker}" for path, worker in working.items()]
     lines = [*running, f"{folder.path}:", *changed, *table]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, option, print_result
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, option, print_result, switch
 from walkerlab.views.report.tables import paragraph
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ class SweepRequest(Request):
         "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
     )
     stage: str | None = option("--stage", metavar="NAME", help="The stage to run.")
-    zipped: bool = option(
-        "--zip", default=False, help="Combine the n-th values into the n-th point, instead of forming the full grid."
+    zipped: bool = switch(
+        "--zip", help="Combine the n-th values into the n-th point, instead of forming the full grid."
     )
     sample: str | None = option(
         "--sample", metavar="SAMPLER:N", help="Sample points instead: latin-hypercube:500, sobol:512."
@@ -53,10 +53,8 @@ class SweepRequest(Request):
     against: str | None = option(
         "--against", metavar="NAME", help="Quantity on the horizontal axis; default: the swept parameters."
     )
-    as_csv: bool = option(
-        "--csv",
-        default=False,
-        help="Print the points with their headline values as CSV, and store that next to the result.",
+    as_csv: bool = switch(
+        "--csv", help="Print the points with their headline values as CSV, and store that next to the result."
     )
 
 

@@ -76,7 +76,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
 
 def rank(key: str, first: Any) -> int | None:
     """Return a key's position among those shown initially, or None if it appears in searches only."""
-    if (key.startswith(DRIVES) and not first) or key.startswith("walker.knee."):
+    if (key.startswith(DRIVES) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
     places = (index for index, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
     return next(places, None)
@@ -208,7 +208,7 @@ class ExploredConfig:
 
     @property
     def all_sets(self) -> list[str]:
-        """All changes of the config, as KEY=VALUE."""
+        """All changes to the config, as KEY=VALUE."""
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
@@ -257,11 +257,7 @@ def walk(question: ExploredConfig) -> Answered:
         no_answer = answers[stage].no_answer
         answer[stage] = answers[stage].findings
         if no_answer is not None:
-            answer[stage]["error"] = {
-                "message": no_answer.message,
-                "advice": no_answer.advice,
-                "exit_code": no_answer.exit_code,
-            }
+            answer[stage]["error"] = no_answer.as_json()
             if stage == "fixedpoint":
                 break
         elif stage != "fixedpoint":

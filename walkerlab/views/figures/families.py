@@ -1,18 +1,17 @@
 """Figures of families of gaits: 13 (bifurcations), 14 (multipliers) and 16 (regions in a plane of two parameters)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count, cycle, pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from walkerlab.labels import axis_label
@@ -21,9 +20,6 @@ from walkerlab.views.figures.canvas import add_legend, entry, figure_style, is_n
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.maps import Kind, draw_kinds
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
-
-if TYPE_CHECKING:
-    from matplotlib.typing import LineStyleType
 
 
 def draw_unit_circle(multipliers: Sequence[complex]) -> Figure:
@@ -37,9 +33,8 @@ def draw_unit_circle(multipliers: Sequence[complex]) -> Figure:
             colour = BLUE if abs(multiplier) < 1.0 else VERMILLION
             axes.plot(multiplier.real, multiplier.imag, "o", color=colour, markeredgecolor=BLACK)
         extent = 1.1 * max(1.0, *map(abs, multipliers))
-        axes.set(
-            xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal", xlabel="real part", ylabel="imaginary part"
-        )
+        ends = (-extent, extent)
+        axes.set(xlim=ends, ylim=ends, aspect="equal", xlabel="real part", ylabel="imaginary part")
         axes.set_title(f"Multipliers; the largest has magnitude {max(map(abs, multipliers)):.3g}")
         settle(figure)
     return figure

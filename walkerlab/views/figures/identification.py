@@ -155,9 +155,6 @@ def draw_worth(results: Results) -> Drawn:
     return figure, (axis_label(most), float(shares[most]))
 
 
-MEASURED_STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
-
-
 PANEL_INCHES: Final = 2.1
 MEASUREMENT_COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
 
@@ -189,16 +186,13 @@ def draw_errors(results: Results) -> Drawn:
     return figure, (int(summary["max_steps"]), any("wanted" in parameter for parameter in entries))
 
 
+MEASURED_STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
+WORST = Need(IDENTIFY_STAGE, "worst", ("moves",), "fewer than two combinations of parameters are determined")
+PLANNED = Need("plan", "errors", ("standard_error",), "no errors were computed")
 FIGURES: Final = (
     Illustration("identified-steps", (MEASURED_STEPS,), draw_steps),
     Illustration("identified-residuals", (MEASURED_STEPS,), draw_residuals),
-    Illustration(
-        "identified-trade-off",
-        (Need(IDENTIFY_STAGE, "worst", ("moves",), "fewer than two combinations of parameters are determined"),),
-        draw_trade_off,
-    ),
+    Illustration("identified-trade-off", (WORST,), draw_trade_off),
     Illustration("identified-worth", (MEASURED_STEPS,), draw_worth),
-    Illustration(
-        "planned-errors", (Need("plan", "errors", ("standard_error",), "no errors were computed"),), draw_errors
-    ),
-)  # fmt: skip
+    Illustration("planned-errors", (PLANNED,), draw_errors),
+)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from walkerlab.config.walkers import AssembledWalker, CompassWalker, Kneed, StraightLegs, second_leg_of
+from walkerlab.config.walkers import AssembledWalker, CompassWalker, Kneed, StraightLegs
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.style import BLACK, BLUE, FIGURE_WIDTH, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION
 
@@ -150,7 +150,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw an upright leg with its dimensions, and the other leg faintly behind it. Legs that differ have a panel
     each, the first leg above.
     """
-    legs = [measure_leg(each) for each in dict.fromkeys((walker, second_leg_of(walker)))]
+    legs = [measure_leg(each) for each in dict.fromkeys((walker, walker.second))]
     views = [frame_leg(leg) for leg in legs]
     heights = [FIGURE_WIDTH * (view.top - view.bottom) / view.width for view in views]
     titles = len(legs) > 1

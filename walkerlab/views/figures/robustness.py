@@ -141,9 +141,8 @@ def plot_rough_ground(results: Results) -> Drawn:
     figure = blank(1.6 + 2.0 * LOWER_PANEL_INCHES)
     tall = (figure.get_figwidth() - AXIS_LABEL_INCHES) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
-    walk, heights, share = figure.subplots(
-        3, 1, height_ratios=[tall, 0.7 * LOWER_PANEL_INCHES, 1.3 * LOWER_PANEL_INCHES]
-    )
+    ratios = [tall, 0.7 * LOWER_PANEL_INCHES, 1.3 * LOWER_PANEL_INCHES]
+    walk, heights, share = figure.subplots(3, 1, height_ratios=ratios)
     walk.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="height (m)")
     heights.sharex(walk)
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
@@ -177,18 +176,11 @@ def draw_shares(axes: Axes, steps: Group) -> None:
     axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
 
 
-FIGURE_18 = paper_figure(
-    18,
-    (
-        Need(
-            ROBUSTNESS_STAGE,
-            "rough_walk/trajectory",
-            ("hip_along_m", "foot_along_m"),
-            "no walk on rough ground was requested",
-        ),
-        Need(ROBUSTNESS_STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
-        Need(ROBUSTNESS_STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
-    ),
-    plot_rough_ground,
+NO_ROUGH_WALK = "no walk on rough ground was requested"
+ROUGH_NEEDS = (
+    Need(ROBUSTNESS_STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), NO_ROUGH_WALK),
+    Need(ROBUSTNESS_STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
+    Need(ROBUSTNESS_STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
 )
+FIGURE_18 = paper_figure(18, ROUGH_NEEDS, plot_rough_ground)
 FIGURES: Final[tuple[Any, ...]] = (FIGURE_18,)

@@ -291,9 +291,8 @@ def draw_energies(results: Results) -> Drawn:
     means = []
     for walk in walks:
         energy = walk["mechanical_J"]
-        durations = np.diff(walk.time)
-        integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
-        means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
+        duration = walk.time[-1] - walk.time[0]
+        means.append((walk.look.label, np.trapezoid(energy, walk.time) / duration if duration else energy[0]))
     impacts = any(walk.look is CONTACT_LOOK for walk in walks)
     config = results[RIGID_STAGE].identity.config_slice
     driven = any((config["push_off"]["impulse_N_s"], *config["walker"]["hip"].values()))

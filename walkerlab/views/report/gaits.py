@@ -86,19 +86,17 @@ WORK_ROUNDING = 1e-12
 """Fraction of the largest contribution to the work below which a contribution is a rounding error."""
 
 
+def source_work(name: str, record: Mapping[str, Any]) -> float | None:
+    """Return the work of a source, or None if it is at rounding level."""
+    work = record.get("work_per_step_J") or {}
+    largest = max(map(abs, work.values()), default=0.0)
+    return work[name] if abs(work.get(name, 0.0)) > WORK_ROUNDING * largest else None
+
+
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
     """Yield a column for each source of work. Values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
-        # The default keeps the present name, because the function is called after the loop has ended.
-        def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
-            work = record.get("work_per_step_J") or {}
-            return (
-                work[name]
-                if work.get(name) and abs(work[name]) > WORK_ROUNDING * max(map(abs, work.values()))
-                else None
-            )
-
-        yield Column(f"work of {source} per step (J)", source_work, written)
+        yield Column(f"work of {source} per step (J)", partial(source_work, name), written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:

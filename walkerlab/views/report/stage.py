@@ -30,15 +30,14 @@ def run(
     written, results = write_pages(config, inputs, folder, left_out)
     progress.advance()
     blocks = (block for page in written for section in page.sections for block in section.blocks)
-    return Content(
-        {artifact.FILES_GROUP: artifact.index_files(folder, [folder / page.file for page in written])},
-        {
-            "html": MAIN,
-            "pages": [page.file for page in written],
-            "figures": [picture.title for picture in results.pictures],
-            "tables": [block.caption for block in blocks if isinstance(block, Table)],
-        },
-    )
+    files = artifact.index_files(folder, [folder / page.file for page in written])
+    summary = {
+        "html": MAIN,
+        "pages": [page.file for page in written],
+        "figures": [picture.title for picture in results.pictures],
+        "tables": [block.caption for block in blocks if isinstance(block, Table)],
+    }
+    return Content({artifact.FILES_GROUP: files}, summary)
 
 
 def write_pages(

@@ -1,1 +1,1 @@
-"""A pipeline whose points are quick, without an answer, wrong, or deadly."""
+"""A pipeline whose points are quick, lack an answer, fail, or kill their process."""

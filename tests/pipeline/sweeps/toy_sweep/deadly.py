@@ -1,4 +1,4 @@
-"""Some seeds end the process, one raises, one ends it the first time only, one needs memory; others take a moment."""
+"""Some seeds end the process, each time or only once, one raises, and one needs memory. The others take a moment."""
 
 import os
 import signal

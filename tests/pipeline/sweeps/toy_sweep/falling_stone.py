@@ -1,4 +1,4 @@
-"""A stone falls."""
+"""Drop a stone."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""It rolls on."""
+"""Let the stone roll on."""
 
 from walkerlab.pipeline.store.content import Content
 

@@ -1,4 +1,4 @@
-"""The graph."""
+"""Graph of the toy pipeline for sweeps."""
 
 from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.pipeline.plan.stage import STRIDES, Stage, results_of

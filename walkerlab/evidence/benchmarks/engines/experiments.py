@@ -176,7 +176,7 @@ class EngineExperiment:
     ) -> EngineRow:
         """Evaluate a run, or record why it was lost. `start` is the initial velocities as a multiple of the gait's."""
         # under our law, the errors are those of the end state and the touch times; on the engine's own contact, it is
-        # the error of the last period, and only completed walks that start from the gait have one
+        # error of the last period; only completed walks that start from the gait have one
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s = stepping.step_s
         tolerance = stepping.tolerance

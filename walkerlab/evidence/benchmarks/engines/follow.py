@@ -6,7 +6,9 @@ and velocities at both ends, so a touch is located to fourth order in the step.
 
 import math
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,12 +17,11 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.external import feet_and_forces
 from walkerlab.physics.ground.knees import MIN_FLEXION, lock_knee
 from walkerlab.physics.ground.pulse import pulse_left
-from walkerlab.physics.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
+from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, place_on_ground
 from walkerlab.physics.hybrid import contact_state, contact_transitions
-from walkerlab.physics.hybrid import contact_state as contact_events
 from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
-from walkerlab.physics.hybrid.contact_state import new_walk_state
+from walkerlab.physics.hybrid.contact_state import WalkState, new_walk_state
 from walkerlab.physics.hybrid.endings import FALLEN_HIP, GOES_ON
 from walkerlab.physics.solvers.scipy_methods import entry_point
 from walkerlab.physics.solvers.system import Floats
@@ -37,6 +38,42 @@ class Turn:
 
     share: float  # fraction of the step at which it occurs
     event: int  # index of its event function
+
+
+Bend = tuple[float, float]
+"""Extension (rad) of a knee, and its rate (rad/s)."""
+
+
+class WalkerProbe:
+    """Compiled function for the feet and the forces on the walker, bound to a scene's model and walk state."""
+
+    def __init__(self, scene: EngineScene, ground: Any, walk_state: WalkState) -> None:
+        size = scene.model.size
+        # the system shares the walk state's progress array, which is therefore current at every call
+        self.system = place_on_ground(scene.walker, ground, progress=walk_state.progress)
+        self._fixed = (self.system, scene.model.chain)
+        self._motion = np.zeros((2, 4))
+        self._forces = np.zeros(size)
+        self._none = np.zeros(0)
+        self._knees = scene.knee_indices
+        self._call = entry_point(
+            feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces
+        )
+
+    def feet(self, q: Floats, v: Floats) -> Feet:
+        """Return the motion of both feet from q and v, which must be contiguous arrays."""
+        self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
+        first, second = self._motion.tolist()
+        return FootMotion(*first), FootMotion(*second)
+
+    def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
+        """Return the generalised forces on the walker, in memory that the next call overwrites."""
+        self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
+        return self._forces
+
+    def bends(self, q: Floats, v: Floats) -> list[Bend]:
+        """Return the extension of each knee and its rate. Both are zero for a locked knee."""
+        return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self._knees]
 
 
 class RuleFollower:
@@ -65,57 +102,30 @@ class RuleFollower:
         # both feet stand on the ground, but rounding may put them slightly above it
         first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
         self._feet = first, second
-        self._edges = [self._edges_of(foot) for foot in range(2)]
+        self._edges = [edges_under(scene.ground.terrain, foot, self.walk_state.cells[foot]) for foot in range(2)]
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Bind the compiled function to a scene's model and its constant arguments, and evaluate it once."""
-        size = scene.model.size
-        state = self.walk_state
-        # the system shares the walk state's progress array, which is therefore current at every call
-        system = place_on_ground(scene.walker, self._ground, progress=state.progress)
+        """Follow a scene's model from q and v on."""
         self.scene = scene
-        self._fixed = (system, scene.model.chain)
-        self._motion = np.zeros((2, 4))
-        self._forces = np.zeros(size)
-        self._none = np.zeros(0)
-        self._call = entry_point(
-            feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces
-        )
-        self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
-
-    def feet(self, q: Floats, v: Floats) -> Feet:
-        """Return the motion of both feet from q and v, which must be contiguous arrays."""
-        self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
-        first, second = self._motion.tolist()
-        return FootMotion(*first), FootMotion(*second)
-
-    def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
-        """Return the generalised forces on the walker, in memory that the next call overwrites."""
-        self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
-        return self._forces
-
-    def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
-        """Return the extension (rad) of each knee and its rate (rad/s). Both are zero for a locked knee."""
-        return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_indices]
-
-    def _edges_of(self, foot: int) -> tuple[float, float]:
-        """Return the edges (m) of the pad or gap under a foot. They are infinite on ground without pads."""
-        terrain = self.scene.ground.terrain
-        if not terrain.has_pads:
-            return -math.inf, math.inf
-        return cell_edges(terrain, foot, int(self.walk_state.cells[foot]))
+        self.probe = WalkerProbe(scene, self._ground, self.walk_state)
+        self._feet = self.probe.feet(q, v)
+        self._bends = self.probe.bends(q, v)
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Update the walk after an engine step. Return whether the ground under a foot may have changed."""
         before = self._feet
-        now = self.feet(q, v)
+        now = self.probe.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
             self._end(Outcome.SOLVER_FAILED)
             return False
         if self._bends:
-            bends = self._bends_in(q, v)
+            bends = self.probe.bends(q, v)
             if self.watches:
-                self.turn = self._turning(time_s - self.time_s, now, bends)
+                stance = self.walk_state.progress.stance
+                sinking = before[stance].vertical_velocity, now[stance].vertical_velocity
+                pushing_s = pulse_left(self.probe.system, self.time_s)
+                knees = zip(self._bends, bends, strict=True)
+                self.turn = first_turn(self.walk_state, time_s - self.time_s, pushing_s, sinking, knees)
                 if self.turn is not None:
                     return False
             self._bends = bends
@@ -140,12 +150,12 @@ class RuleFollower:
             if cell == walk_state.cells[foot]:
                 continue
             walk_state.cells[foot], walk_state.has_ground[foot] = cell, has_ground_in_cell(cell)
-            self._edges[foot] = self._edges_of(foot)
+            self._edges[foot] = edges_under(terrain, foot, cell)
             # The foot has met the flank of a pad, below its top.
             if walk_state.has_ground[foot] and now[foot].height < 0.0:
                 self._end(Outcome.OFF_PAD)
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
-            walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
+            walk_state.sides[contact_state.PASSING] = 1 if now[1].along > now[0].along else -1
             for foot in range(2):
                 contact_transitions.find_ground(walk_state, foot, contact_state.is_above(walk_state, foot))
         h = time_s - self.time_s
@@ -153,7 +163,7 @@ class RuleFollower:
             above = now[foot].height >= 0.0
             if (before[foot].height >= 0.0) == above:
                 continue
-            walk_state.sides[foot * contact_events.PER_FOOT + contact_events.HEIGHT] = 1 if above else -1
+            walk_state.sides[foot * contact_state.PER_FOOT + contact_state.HEIGHT] = 1 if above else -1
             old = before[foot]
             new = now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
@@ -169,30 +179,6 @@ class RuleFollower:
         if completed and not contact_state.has_not_lifted(walk_state):
             self._end(Outcome.WALKED)
 
-    def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
-        """Return the first lock or release of a knee within a step of h (s), or None if no knee locks or is
-        released.
-        """
-        walk_state = self.walk_state
-        turns = []
-        stance = walk_state.progress.stance
-        pushing_s = pulse_left(self._fixed[0], self.time_s)
-        if walk_state.progress.release == contact_state.AT_PULSE_END:
-            if pushing_s <= h:
-                turns.append(Turn(pushing_s / h, contact_events.PULSE_END))
-        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0 and pushing_s > h:
-            walk_state.progress.release = contact_state.AT_PULSE_END
-        elif walk_state.progress.release and now[stance].vertical_velocity >= 0.0:
-            sinking = max(0.0, -self._feet[stance].vertical_velocity)
-            share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
-            turns.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
-        for knee, (old, bend) in enumerate(zip(self._bends, bends, strict=True)):
-            if walk_state.knee[knee] == RELEASED and bend[0] < -MIN_FLEXION:
-                walk_state.knee[knee] = BENT
-            elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
-                turns.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
-        return min(turns, default=None)
-
     @property
     def is_outdated(self) -> bool:
         """Whether a touch has released a knee that the engine's model still has locked."""
@@ -205,7 +191,7 @@ class RuleFollower:
         walker = self.scene.ours
         walk_state = self.walk_state
         y = self.scene.about_centre(q, v)
-        if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
+        if self.turn is not None and contact_state.EXTENSION <= self.turn.event < contact_state.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
             y = lock_knee(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
         elif self.turn is not None:
@@ -230,7 +216,7 @@ class RuleFollower:
         if inside[0] or inside[1]:
             self.grounded_s = t
             stance = self.walk_state.progress.stance
-            far = contact_events.farthest_slide(ground.terrain)
+            far = contact_state.farthest_slide(ground.terrain)
             if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
                 y = tuple(self.scene.about_centre(q, v).tolist())
                 # A round foot also moves away from its foothold as it rolls. Only the way of its material is sliding.
@@ -243,6 +229,39 @@ class RuleFollower:
             self._end(Outcome.FELL)
         elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(Outcome.NO_HEEL_STRIKE)
+
+
+def edges_under(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
+    """Return the edges (m) of the pad or gap under a foot. They are infinite on ground without pads."""
+    return cell_edges(terrain, foot, int(cell)) if terrain.has_pads else (-math.inf, math.inf)
+
+
+def first_turn(
+    walk_state: WalkState, h: float, pushing_s: float, sinking: tuple[float, float], knees: Iterable[tuple[Bend, Bend]]
+) -> Turn | None:
+    """Return the first lock or release of a knee within a step of h (s), or None if no knee locks or is released.
+
+    pushing_s  rest of the push-off at the start of the step
+    sinking    vertical velocities (m/s) of the stance foot at both ends of the step
+    knees      bend of each knee at both ends of the step
+    """
+    turns = []
+    before, now = sinking
+    if walk_state.progress.release == contact_state.AT_PULSE_END:
+        if pushing_s <= h:
+            turns.append(Turn(pushing_s / h, contact_state.PULSE_END))
+    elif walk_state.progress.release and now >= 0.0 and pushing_s > h:
+        walk_state.progress.release = contact_state.AT_PULSE_END
+    elif walk_state.progress.release and now >= 0.0:
+        share = -before / (now - before) if before < 0.0 else 0.0
+        stance = int(walk_state.progress.stance)
+        turns.append(Turn(share, stance * contact_state.PER_FOOT + contact_state.VERTICAL_VELOCITY))
+    for knee, (old, bend) in enumerate(knees):
+        if walk_state.knee[knee] == RELEASED and bend[0] < -MIN_FLEXION:
+            walk_state.knee[knee] = BENT
+        elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
+            turns.append(Turn(crossing(*old, *bend, h), contact_state.EXTENSION + knee))
+    return min(turns, default=None)
 
 
 def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:

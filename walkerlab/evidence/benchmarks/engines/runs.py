@@ -108,7 +108,7 @@ class EngineWalk:
         offset_s = self.time_s
 
         def forces(time_s: float, q: Floats, v: Floats) -> Floats:
-            return rules.forces(offset_s + time_s, q, v)
+            return rules.probe.forces(offset_s + time_s, q, v)
 
         driven = task.scene.ours.driven or task.scene.ours.whole.sprung
         outside = forces if task.own is None or driven else None

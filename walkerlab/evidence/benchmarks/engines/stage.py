@@ -52,7 +52,7 @@ def supported_scene(
     points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
     if any(points) and not all(points):
         raise ConfigError(
-            "engines: a point foot becomes a ball on ground that is lower by its radius, and the other foot is round.",
+            "engines: one foot is a point, the other is round. A point foot needs ground lower by the ball's radius.",
             f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)

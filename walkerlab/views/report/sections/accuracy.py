@@ -32,9 +32,8 @@ def section(results: page.Results, summary: Row) -> page.Section | None:
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
         fastest.setdefault(join_words(dict.fromkeys(best.values())), []).append(scene)
-    return page.Section.create(
-        "accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), page.COSTS
-    )
+    finding = words("accuracy.fastest", fastest)
+    return page.Section.create("accuracy", "Error against run time", blocks, finding, page.COSTS)
 
 
 def costs(summary: Row) -> Table:

@@ -49,9 +49,8 @@ def limit(results: Results) -> Section | None:
         *(table(caption, columns, rungs, note=note) for caption, rungs in settings.items()),
         table("Convergence of the period when one parameter changes", ORDER_COLUMNS, rows),
     )
-    return Section.create(
-        "limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS
-    )
+    finding = words("adjustment.reached", reaches, pushes)
+    return Section.create("limit", "Towards the rigid limit", blocks, finding, COSTS)
 
 
 def starts_table(results: Results, summary: Summary) -> Table:

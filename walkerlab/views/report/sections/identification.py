@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from walkerlab.labels import add_unit, axis_label, join_words, unit_by_name
@@ -223,13 +224,12 @@ def contradicted_priors(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, 
 
 
 def describe_nuisances(nuisances: Mapping[str, Mapping[str, float]]) -> str:
-    return capitalised(
-        join_words(
-            f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
-            f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
-            for name, row in nuisances.items()
-        )
+    phrases = (
+        f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
+        f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
+        for name, row in nuisances.items()
     )
+    return capitalised(join_words(phrases))
 
 
 def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
@@ -275,18 +275,13 @@ def plan_section(_results: Results, summary: Mapping[str, Any]) -> Section | Non
 
 def plan_findings(summary: Mapping[str, Any]) -> list[str]:
     """Return the answer in sentences: the simplest measurement, the steps for each target error, the assumptions."""
-    return words.parts("plan.findings", summary, [goal for goal in goals(summary) if goal])
-
-
-def goals(summary: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each target error, with the fewest steps that reach it."""
     rows = summary["measurements"]
-    return [
-        goal(rows, index, summary["max_steps"]) for index, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
-    ]
+    targets = [place for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry]
+    return words.parts("plan.findings", summary, [goal(rows, place, summary["max_steps"]) for place in targets])
 
 
 def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
+    """Return a sentence about a target error, with the fewest steps that reach it."""
     entry = rows[0]["errors"][place]
     unit = UNITS_IN_WORDS.get(entry["unit"], f" {entry['unit']}")
     wanted = f"{axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
@@ -303,23 +298,18 @@ def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
     entries = summary["measurements"][0]["errors"]
     columns = [Column("measurement", "measurement"), Column("start", "start")]
     for index, entry in enumerate(entries):
-        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(index), numeric=True))
+        title = f"± {axis_label(entry['key'])} ({entry['unit']})"
+        columns.append(Column(title, partial(error_text, index), numeric=True))
         if "wanted" in entry:
-            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(index), numeric=True))
+            columns.append(Column(f"steps for ± {number(entry['wanted'])}", partial(steps_text, index), numeric=True))
     return [table(f"Standard errors after {summary['steps']} steps", columns, summary["measurements"])]
 
 
-def error_of(place: int) -> Any:
-    def text(row: Mapping[str, Any]) -> str:
-        error = row["errors"][place]["standard_error"]
-        return "open" if error is None else number(error, 2)
-
-    return text
+def error_text(place: int, row: Mapping[str, Any]) -> str:
+    error = row["errors"][place]["standard_error"]
+    return "open" if error is None else number(error, 2)
 
 
-def steps_of(place: int) -> Any:
-    def text(row: Mapping[str, Any]) -> str:
-        needed = row["errors"][place]["steps_needed"]
-        return "" if needed is None else format_integer(needed)
-
-    return text
+def steps_text(place: int, row: Mapping[str, Any]) -> str:
+    needed = row["errors"][place]["steps_needed"]
+    return "" if needed is None else format_integer(needed)

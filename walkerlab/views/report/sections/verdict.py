@@ -75,9 +75,8 @@ def section(results: Results) -> Section | None:
         Statements(tuple(statements), "cards") if statements else None,
         Paragraph(departure(results)),
     )
-    return Section.create(
-        "verdict", "Verdict", blocks if any(blocks) else (Paragraph("There are no results to judge."),)
-    )
+    nothing = (Paragraph("There are no results to judge."),)
+    return Section.create("verdict", "Verdict", blocks if any(blocks) else nothing)
 
 
 def failures(results: Results) -> list[str]:
