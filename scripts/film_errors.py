@@ -1,4 +1,4 @@
-"""Film a walk by simulated cameras, and print the errors of what is read: periods, step lengths, slope and hip mass.
+"""Film a walk by simulated cameras, and print a table of the errors of what is read: periods, step lengths, estimates.
 
 Usage: python scripts/film_errors.py [fit]
 
@@ -66,7 +66,17 @@ def film(config, fps, noise_deg, path):
 
 
 def main(fits):
-    print("frames/s | noise (deg) | steps | period: mean, r.m.s. error (ms) | length: mean, r.m.s. error (mm) | fit")
+    columns = [
+        "frames/s",
+        "noise (deg)",
+        "steps",
+        "mean period (ms)",
+        "a period (ms)",
+        "mean length (mm)",
+        "a length (mm)",
+    ]
+    columns += ["slope (deg), hip mass (kg)"] * fits
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
     config = load(Path(CONFIG)).config
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.csv"
@@ -78,21 +88,23 @@ def main(fits):
                         path, walker=config.walker, slope_deg=math.degrees(config.slope_rad)
                     ).summary
                 except WalkerlabError as error:
-                    print(f"{fps:.0f} | {noise} | {error}", flush=True)
+                    print(f"| {fps:.0f} | {noise} | {error} |", flush=True)
                     continue
-                count = read["steps"]
-                off = 1e3 * (np.array(read["step_periods_s"]) - periods[:count].mean())
+                off = 1e3 * (np.array(read["step_periods_s"]) - periods.mean())
                 away = 1e3 * (np.array(read["step_lengths_m"]) - length)
-                text = ""
-                if fits:
-                    fit = {"slope_deg": None, "walker.hip_mass_kg": None}
-                    answer = walkerlab.identify(path, CONFIG, fit=fit, level="angles").summary
-                    text = ", ".join(
-                        f"{each['value']:.3f} ± {each['standard_error']:.3f}" for each in answer["estimates"]
-                    )
-                    text += f", {answer['models'][0]['fit']}"
-                errors = [f"{each.mean():.2f}, {math.sqrt(np.mean(each**2)):.2f}" for each in (off, away)]
-                print(f"{fps:.0f} | {noise} | {count} | {' | '.join(errors)} | {text}", flush=True)
+                errors = [
+                    f"{value:.1f}" for each in (off, away) for value in (each.mean(), math.sqrt(np.mean(each**2)))
+                ]
+                cells = [f"{fps:.0f}", str(noise), str(read["steps"]), *errors, *([estimates(path)] if fits else [])]
+                print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def estimates(path):
+    """Describe the slope and the hip mass that a fit finds, with their standard errors and the judgement of the fit."""
+    fit = {"slope_deg": None, "walker.hip_mass_kg": None}
+    answer = walkerlab.identify(path, CONFIG, fit=fit, level="angles").summary
+    values = ", ".join(f"{each['value']:.3f} ± {each['standard_error']:.3f}" for each in answer["estimates"])
+    return f"{values}, {answer['models'][0]['fit']}"
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ DOWNLOAD = re.compile(r"\]\((downloads/[^)]+)\)")
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 TERMINAL = {"COLUMNS": "100"}
 Run = Callable[[str, int], tuple[str, int]]
-"""What runs a command, after one that ended with an exit code: what it prints, and its own exit code."""
+"""Runs a command, given the exit code of the one before. Returns its output and its own exit code."""
 PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 

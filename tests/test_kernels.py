@@ -170,7 +170,7 @@ def powers_summed(like, x):
 
 @kernel
 def scratch_beside_scratch(like, out):
-    """What a called function writes into its scratch does not reach the caller's."""
+    """Fill scratch, and add what a function computes that has scratch of its own."""
     mine = vector(like)
     for i in range(len(mine)):
         mine[i] = i

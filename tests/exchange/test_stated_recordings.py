@@ -181,6 +181,18 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
     assert summary["doubts"] == ["The file's times, 30 frames/s, are replaced by 240 frames/s."]
 
 
+def test_frame_rate_of_a_table_with_one_row_is_refused_in_words(tmp_path):
+    path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.0, 0.1, -0.1)])
+    with pytest.raises(ConfigError):
+        steps_of(path, fps=100.0)
+
+
+def test_angles_that_would_overflow_are_refused_in_words(tmp_path):
+    path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.01 * n, 1e300 * n, 0.1) for n in range(200)])
+    with pytest.raises(ConfigError):
+        steps_of(path)
+
+
 def test_table_without_times_counts_samples_as_frames(tmp_path):
     _, angle = sampled(fps=60.0)
     path = table(tmp_path, "angle 1 (rad),angle 2 (rad)", angle)
@@ -331,7 +343,7 @@ def test_slope_of_a_sports2d_film_is_estimated_only_if_the_floor_is_stated(tmp_p
     path = tmp_path / "walk.mot"
     path.write_text(sports2d_angles(angles_at(sampled()[0]) + SLOPE), encoding="utf-8")
     columns = {"angle 1": "right thigh+90deg", "angle 2": "left thigh+90deg"}
-    with pytest.raises(ConfigError, match="which levels the floor") as refused:
+    with pytest.raises(ConfigError, match="which makes the floor level") as refused:
         walkerlab.identify(path, fit=["slope_deg"], level="angles", columns=columns)
     assert "--camera-tilt floor" in refused.value.advice
 

@@ -178,14 +178,15 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
     if asked.fps is None or not recording.columns:
         return recording, []
     name = asked.columns.get(TIME) or next((name for name in recording.columns if FRAME.fullmatch(name)), None)
-    stated = recording.columns.get(recording.time_name or "")
+    stated = recording.columns.get(recording.time_name or "", np.zeros(0))
+    intervals = np.diff(stated[np.isfinite(stated)])
     notes = []
     if name is not None:
         refuse_problem(recording, name := named_column(recording, name))
         frames = recording.columns[columns_of(recording, name)[0]]
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
-    elif stated is not None and (typical := float(np.nanmedian(np.diff(stated)))) > 0.0:
+    elif intervals.size and (typical := float(np.median(intervals))) > 0.0:
         # Where the file leaves out frames, its times are farther apart, so rounding still counts them.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
@@ -302,7 +303,7 @@ def add_lines(
 
 
 def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
-    """Return the samples of a walk at `rows` (samples,)."""
+    """Return the samples of a walk where `rows` (samples,) is true."""
     kept = {name: values[rows] for name, values in walk.quantities.items()}
     return replace(walk, time_s=walk.time_s[rows], quantities=kept)
 

@@ -230,11 +230,12 @@ def unseen_as_gaps(
 
 
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) that repeat a position (samples, axes) before it leaps to where it should have moved.
+    """Mark the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
 
     Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
     missing, because a foot may have stood still before the gap.
     """
+    places = np.clip(places, -HUGE, HUGE)
     change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)
     still = np.append(False, change[:-1] == 0.0)
     frozen = np.zeros(len(places), bool)

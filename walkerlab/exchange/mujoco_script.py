@@ -98,7 +98,10 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Let the friction's damper grow with the load on the feet, as in ADAMS. At a strike it is many weights."""
+        """Let the friction's damper grow with the load on the feet, as in ADAMS.
+
+        At a strike the load is many times the weight.
+        """
         load = self.data.qfrc_constraint[self.height]
         self.model.opt.impratio = self.impratio * max(1.0, load / self.weight)
 

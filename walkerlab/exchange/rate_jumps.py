@@ -71,7 +71,7 @@ def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[in
 
 
 def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first and last sample of each stretch in which the same leg is far ahead."""
+    """Return the first and last sample of each stretch in which one leg stays far ahead of the other."""
     kind = np.where(apart, np.where(first_ahead, 1, -1), 0)
     bounds = np.flatnonzero(np.diff(kind)) + 1
     edges = zip((0, *bounds.tolist()), (*bounds.tolist(), kind.size), strict=True)
@@ -124,15 +124,11 @@ def squares_before(
     (parts, instants) of such a value if that of the samples is 1.
     """
     degree = int(degrees.max())
-    spans = np.array(
-        [(t[0], max(t[n - 1], last)) for (t, _), n, last in zip(parts, counts.max(1), instants.max(1), strict=True)]
-    )
-    # Powers would make the normal equations too ill-conditioned for this degree.
-    at = chebvander(on_span(instants, spans[:, :1], spans[:, 1:]), degree)
+    each = zip(parts, instants, counts, strict=True)
+    products, bases = zip(*(products_of(part, row, ends, degree) for part, row, ends in each), strict=True)
     # All instants of a part share these sums, so each one costs only the solution of a few equations.
-    moments = np.cumsum(
-        [moments_of(part, span, row, degree) for part, span, row in zip(parts, spans, counts, strict=True)], axis=1
-    )
+    moments = np.cumsum(products, axis=1)
+    at = np.array(bases)
     used = (np.arange(degree + 1) <= degrees[..., None]) & (counts[..., None] > 1)
     square = moments[..., : degree + 1, : degree + 1] * (used[..., :, None] & used[..., None, :])
     # A coefficient that is not used still needs an equation, which makes it zero.
@@ -148,17 +144,20 @@ def squares_before(
     return squares, values, np.where(fitted, explained[..., -1], np.inf)
 
 
-def on_span(times: Array, first: Array, last: Array) -> Array:
-    """Map times from a span to -1 to 1."""
-    return np.asarray(2.0 * (times - first) / np.where(last > first, last - first, 1.0) - 1.0)
+def products_of(
+    part: tuple[Array, Array], instants: Array, counts: NDArray[np.int64], degree: int
+) -> tuple[list[Array], Array]:
+    """Return the products of polynomials and values, summed between samples, and the polynomials at the instants.
 
-
-def moments_of(part: tuple[Array, Array], span: Array, counts: NDArray[np.int64], degree: int) -> list[Array]:
-    """Return the products of polynomials and values of both legs, summed from each of `counts` samples to the next."""
+    counts  (instants,) samples up to which each sum extends, from the one before
+    """
     end = int(counts.max())
-    t, y = (each[:end] for each in part)
-    columns = np.concatenate((chebvander(on_span(t, *span), degree), y), axis=1)
-    return [columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])]
+    first, last = part[0][0], max(part[0][end - 1], instants.max())
+    times = np.concatenate((part[0][:end], instants))
+    # Powers would make the normal equations too ill-conditioned for this degree.
+    basis = chebvander(2.0 * (times - first) / (last - first or 1.0) - 1.0, degree)
+    columns = np.concatenate((basis[:end], part[1][:end]), axis=1)
+    return [columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], basis[end:]
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:

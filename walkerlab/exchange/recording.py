@@ -611,7 +611,7 @@ def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
     with path.open("rb"):  # raises OSError for an unreadable file; ezc3d does not
         pass
-    # Damaged files end ezc3d in segmentation faults, so a child process runs it.
+    # Damaged files crash ezc3d with segmentation faults, so a child process runs it.
     try:
         # With -P, modules in the working folder cannot take the place of the real ones.
         command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]

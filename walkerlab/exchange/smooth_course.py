@@ -54,7 +54,7 @@ NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples of a leg that a constant brings back to a smooth course."""
+    """Samples of a leg that return to a smooth course if a constant is subtracted."""
 
     leg: int
     first: int
@@ -240,7 +240,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
-        """Return the worst stretch besides others, or None if it is within the limit."""
+        """Return the worst stretch in addition to others, or None if it is within the limit."""
         strike = course.remove_stretches(others).strikes([index])[0]
         if strike.best_stretch(strike.smooth_fit).explained <= SUSPECT * limit:
             return None
@@ -254,7 +254,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     found: list[Stretch] = []
     while len(found) < MOST_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
-    # The first stretches may only have stood in for later ones.
+    # The first stretches may have been found in place of later ones.
     for stretch in found[:-1]:
         others = [other for other in found if other is not stretch]
         found = found if worst(others) else others

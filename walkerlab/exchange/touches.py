@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -87,9 +88,9 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     """
     crossings = candidates(time, angle, height)
     # The period is not known yet, so at first all consecutive crossings of a leg count as one strike.
-    period = typical_interval([crossing for crossing, _ in merge_repeats(crossings, np.inf)], time)
+    period = typical_interval([crossing for crossing, *_ in merge_repeats(crossings, np.inf)], time)
     merged = merge_repeats(crossings, SHORTEST * period)
-    located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in merged])
+    located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg, _ in merged])
     # A fit may move a crossing among the first samples to before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
     first = touch_at_start(time, angle, height, period)
@@ -99,9 +100,9 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     return [touch for touch in touches if touch.fall_m_s >= slowest]
 
 
-def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
-    """Return the time and leg of each candidate heel strike, where the front foot comes down to the level of the rear
-    one. Noise can produce several candidates for one strike.
+def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int, float]]:
+    """Return the candidate heel strikes, where the front foot comes down to the level of the rear one: the time, the
+    leg, and the sum of the foot's heights up to there. Noise can produce several candidates for one strike.
     """
     # A recording may end with a heel strike, perhaps with two samples at that instant, so it is continued by half the
     # interval before.
@@ -112,24 +113,29 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     over = height(angle)
     # The feet are also level as the legs pass each other, where neither leg is far ahead.
     apart = WINDOW_AHEAD * np.abs(spread).max()
+    sums = np.cumsum(over)
     crossings = []
     for i in np.flatnonzero((over[:-1] > 0.0) != (over[1:] > 0.0)):
         leg, ahead = (0, spread[i]) if over[i] > 0.0 else (1, -spread[i])
         if ahead > apart:
             share = over[i] / (over[i] - over[i + 1])
-            crossings.append((float(time[i] + share * (time[i + 1] - time[i])), leg))
+            instant = float(time[i] + share * (time[i + 1] - time[i]))
+            crossings.append((instant, leg, float(-sums[i] if leg else sums[i])))
     return crossings
 
 
-def merge_repeats(crossings: Sequence[tuple[float, int]], apart_s: float) -> list[tuple[float, int]]:
-    """Average consecutive crossings of a leg that are nearer to each other than `apart_s` (s)."""
-    strikes: list[tuple[int, list[float]]] = []
-    for time, leg in crossings:
-        if strikes and strikes[-1][0] == leg and time - strikes[-1][1][-1] < apart_s:
-            strikes[-1][1].append(time)
+def merge_repeats(crossings: Sequence[tuple[float, int, float]], apart_s: float) -> list[tuple[float, int, float]]:
+    """Keep one of consecutive crossings of a leg that are nearer to each other than `apart_s` (s).
+
+    It is the one with the largest sum of heights, before which the foot was above the other one, and after it below.
+    """
+    strikes: list[list[tuple[float, int, float]]] = []
+    for crossing in crossings:
+        if strikes and strikes[-1][-1][1] == crossing[1] and crossing[0] - strikes[-1][-1][0] < apart_s:
+            strikes[-1].append(crossing)
         else:
-            strikes.append((leg, [time]))
-    return [(float(np.mean(times)), leg) for leg, times in strikes]
+            strikes.append([crossing])
+    return [max(repeats, key=itemgetter(2)) for repeats in strikes]
 
 
 def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> Touch | None:
@@ -179,6 +185,9 @@ def locate_touch(
             # one degree more, where the instant is at the end of the samples
             fit = fits.get(degree + 1) or fit
         touch = touch_of(fit, height, near + at, leg) if fit else None
+        if touch and touch.fall_m_s <= 0.0 and DEGREES[0] in fits:
+            # Noise can bend a curve upwards at its end, but hardly a line.
+            touch = touch_of(fits[DEGREES[0]], height, near + at, leg)
         if touch is None or touch.fall_m_s <= 0.0:
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebfit, chebval
 from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
@@ -17,7 +18,7 @@ from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
 from walkerlab.exchange.leg_angles import read_leg_angles
 from walkerlab.exchange.marker_lines import NAMED
 from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
-from walkerlab.exchange.smooth_course import FAR_PERCENT
+from walkerlab.exchange.smooth_course import FAR_PERCENT, HIGHEST_DEGREE, SAMPLES_PER_DEGREE
 from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
 from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
@@ -52,6 +53,7 @@ SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which
 MAX_BELT_DIFFERENCE: Final = 0.03
 """Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
 FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging legs from which a doubt is raised
+NOISE_IN_CLOCK: Final = 7.0  # how much that limit grows with the scatter of the angles, relative to their own
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
@@ -195,7 +197,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
         return steps
     first = model.exchanged if steps.swapped else model
     order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
-    angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
+    angles, rates = (np.take_along_axis(each, order, axis=1) for each in smooth_motion(steps))
     energy, ahead, behind = (
         compute_in_turns(first, steps.step, energies, np.concatenate((angles + turn, rates), axis=1))
         for turn in (0.0, TURN_RAD, -TURN_RAD)
@@ -209,13 +211,31 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     # A tilt turns gravity. The two coefficients are its components, so together they give its size.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
-    if 1.0 / FAR_CLOCK < rate < FAR_CLOCK:
+    far = FAR_CLOCK + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
+    if 1.0 / far < rate < far:
         return steps
     doubt = (
         f"The legs of this walker would swing {rate:.2g} times as fast as those in the recording. The frame rate "
         "(--fps), the unit of time or the walker may be wrong."
     )
     return replace(steps, doubts=(*steps.doubts, doubt))
+
+
+def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
+    """Return angles (rad) and rates (rad/s) of both legs (samples, 2), of a polynomial through each step.
+
+    Rates of a spline would contain so much noise that kinetic energies were too large.
+    """
+    angles = np.empty_like(steps.angle_rad)
+    rates = np.empty_like(steps.angle_rad)
+    for rows in np.split(np.arange(steps.step.size), np.flatnonzero(np.diff(steps.step)) + 1):
+        time = steps.time_s[rows]
+        half = 0.5 * float(np.ptp(time))
+        t = (time - time[0]) / half - 1.0
+        course = chebfit(t, steps.angle_rad[rows], min(HIGHEST_DEGREE, 1 + rows.size // SAMPLES_PER_DEGREE))
+        angles[rows] = chebval(t, course).T
+        rates[rows] = chebval(t, chebder(course)).T / half
+    return angles, rates
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
@@ -289,7 +309,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 
 def alternates(first: Array, second: Array) -> bool:
-    """Whether the means of two samples differ clearly."""
+    """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
     if min(first.size, second.size) < FEWEST_ALTERNATING:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
@@ -455,7 +475,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for each end of a step, the row of its sample, the heel strike, and the rates on this side of it."""
+    """Return, for each end of a step, the row of its sample, the heel strike, and the rates within the step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))

@@ -156,7 +156,7 @@ def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
 
 
 def classes_in(kind: Any) -> Iterator[type]:
-    """Yield the NamedTuple classes in a type of numba or in a tuple of types, and those that records name."""
+    """Yield the NamedTuple classes in a Numba type or in a tuple of types, and those that records name."""
     yield from classes_named_by(getattr(getattr(kind, "dtype", kind), "fields", ()))
     if hasattr(kind, "instance_class"):
         yield kind.instance_class

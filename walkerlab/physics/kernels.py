@@ -135,7 +135,7 @@ class LawKind(NamedTuple):
     laws: dict[str, Any]  # built-in classes by word
     protocol: type
     required: tuple[ByType, ...]  # functions of which each law needs a case
-    together: tuple[ByType, ...] = ()  # functions of which a law has cases of all or of none
+    together: tuple[ByType, ...] = ()  # functions that a law has cases of, either all or none
 
 
 class ByAddress(types.Type):

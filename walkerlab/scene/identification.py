@@ -74,7 +74,7 @@ class Fixed(NamedTuple):
 
     @property
     def measured(self) -> bool:
-        """Whether somebody measured or set it, so that it may be wrong."""
+        """Whether somebody measured or set the value, so that it may be wrong."""
         return self.value != 0.0 and self.name not in KNOWN
 
 

@@ -117,7 +117,7 @@ def test_slope_only_rotates_the_frame(parts, state, slope):
 @settings(max_examples=50)
 @given(state=states)
 def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
-    """What is integrated leaves the centre of mass out; the full matrices about the foot do not."""
+    """The integrated equations leave out the centre of mass. The full matrices about the foot do not."""
     parts = CompassParts(1.0, 0.4, 5.0, 10.0, inertia, 0.0)
     assembly = compass_assembly(parts)
     full = mass_matrix_and_bias(assembly, point_of_stance_foot(parts), state[:2], state[2:], 9.81)

@@ -129,10 +129,11 @@ def drive_to(t, y):
 
 
 def allowed(name, rtol, t):
-    """What the end may be off by, a number for each of the state.
+    """Return the allowed error of the end state, by component.
 
-    A step may err by rtol times the state, which is of order one, and that grows. Most steps err less, and what errs
-    later grows less: a hundredth of it is left, of methods that vary their order, and take many more steps, a tenth.
+    A step may err by rtol times the state, which is of order one, and this error grows along the orbit. Most steps err
+    less, and later errors grow less, so a hundredth of that is allowed. Methods that vary their order take many more
+    steps; they are allowed a tenth.
     """
     lowest, highest = METHODS[name].orders
     return (0.01 if lowest == highest else 0.1) * growth(t) * rtol
@@ -153,11 +154,11 @@ def varied_orbit():
 
 
 def allowed_of_cvode(times, rtol):
-    """What the end of the orbit may be off by after steps that ended at these times, a number for each of the state.
+    """Return the allowed error of the orbit's end after steps that ended at these times, by component.
 
-    CVODE chooses its steps so that each errs by a sixth of rtol times the state plus the absolute tolerance (BIAS2 in
-    cvode.c), and from there on that grows. It errs now to one side, now to the other, as it varies its order, which
-    differs from machine to machine. So the errors add up as the root of their squares.
+    CVODE chooses its steps so that the error of each is a sixth of rtol times the state plus the absolute tolerance
+    (BIAS2 in cvode.c). This error then grows. Its sign varies with the order, which differs from machine to machine, so
+    the errors add up as the root of their squares.
     """
     whole = varied_orbit()(PERIOD)[4:].reshape(4, 4)
     squares = np.zeros(4)

@@ -64,7 +64,7 @@ CASES = [
 WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m²·²|SI)\)")
 PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*")
 SMALLEST = 5.0
-"""Of letters that are read, pt."""
+"""Smallest size of letters (pt)."""
 TOLD_APART = 15
 """Least difference of a part of two colours, of 255."""
 VISIBLE = 0.1

@@ -79,7 +79,7 @@ def test_additional_pages_log_no_errors(browser, folder):
 
 
 HOSTILE = """</script><img src=x onerror="window.harmed = 1">'"><svg onload='window.harmed = 1'>&lt;b&gt;"""
-"""What would run or become an element, if a page took it for markup: in a text, in an attribute, in a script."""
+"""Text that would run or become an element if a page took it for markup: in a text, an attribute or a script."""
 DRAWING = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9" onload="window.harmed = 1">
 <script>window.harmed = 1</script><a href="javascript:window.harmed = 1"><text>linked</text></a>
 <image href="file:///etc/passwd"/><path d="M0 0L9 9" onclick="window.harmed = 1" style="fill: url(https://elsewhere)"/>

@@ -29,14 +29,14 @@ from walkerlab.labels import join_words
 
 REFINED: Final = 5  # candidates that are solved
 FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
-SAME_WALK = 1e-7  # relative change of a first guess that is no change
-FITTING_ROUNDS, LEAST_GAIN = 4, 3.0  # of the size of a mistake, and how much closer it must bring the printed values
+SAME_WALK = 1e-7  # a smaller relative change of a first guess counts as none
+FITTING_ROUNDS, LEAST_GAIN = 4, 3.0  # of a mistake's size, which must bring gaits this many times closer
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # relative error of a fitted size within which a round one is tried
-FEW = 3  # numbers that can be explained while others are not
-MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
-READINGS = 3  # other conventions in which a mistake is searched
-NEARLY = 4.0  # ratio of two distances between which the number of changes decides
+FEW = 3  # at least this many numbers must be explained if others are not
+MUCH_CLOSER = 5.0  # a cause must bring gaits this many times closer to be reported
+READINGS = 3  # number of other conventions in which mistakes are looked for
+NEARLY = 4.0  # conventions up to this many times further off than the nearest are ranked by changes
 CONVERGED: Final = 1e-6  # relative change of a fitted value
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
@@ -80,7 +80,7 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
 
 
 def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
-    """Return the values for which a value may be a misprint, and how it came about."""
+    """Return the values that may have been misprinted as this one, and how."""
     unit = UNIT.findall(key)
     found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
     found |= dict.fromkeys(transposed(value), "two digits are transposed")
@@ -93,7 +93,7 @@ def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tupl
 
 
 def transposed(value: float) -> Iterator[float]:
-    """Yield the values that two neighbouring digits exchanged make of a number."""
+    """Yield the values of a number with two neighbouring digits exchanged."""
     text = short_number(value)
     for place, (first, second) in enumerate(pairwise(text)):
         if first.isdigit() and second.isdigit() and first != second:
@@ -149,12 +149,12 @@ class Question:
         return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.count for each in reproduced))
 
     def reproduced(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> list[Item]:
-        """Return the printed numbers of which a gait has every digit."""
+        """Return the printed numbers that a gait reproduces to every digit."""
         values = walk.values(items, convention or self.convention)
         return [item for item in items if item.fits(values[item.name])]
 
     def fits(self, walk: CheckedStep, convention: Convention) -> bool:
-        """Whether a gait has every printed digit. What needs no derivative is compared first."""
+        """Whether a gait reproduces every printed digit. Numbers that need no derivative are compared first."""
         return all(self.reproduced(walk, items, convention) == items for items in (self.quick_items, self.items))
 
     def explained_by(self, candidate: Candidate, gait: CheckedStep) -> Explanation | None:
@@ -175,7 +175,7 @@ class Question:
         return max((item.miss(values[item.name]) for item in items), default=math.inf)
 
     def misses(self, walker: PlainWalker | None) -> Floats | None:
-        """Return the signed distances of a walker's gait, by a first guess, in units of the last digits."""
+        """Return the signed distances of a walker's gait, estimated from a first guess, in units of the last digits."""
         walk = None if walker is None else self.guess(walker, EXACT)
         if walk is None:
             return None
@@ -233,7 +233,7 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
 
 
 def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
-    """Yield what the gaits of attempts explain. A mistake that has a size counts once."""
+    """Yield the explanations that the gaits of attempts give. A mistake that has a size counts once."""
     families: set[str] = set()
     for candidate, gait in attempts:
         explanation = None if candidate.family in families else question.explained_by(candidate, gait)
@@ -293,7 +293,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
         guess = question.guess(candidate.walker)
         if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
             guesses.append((question.miss(guess, question.quick_items), place, guess))
-    # The place decides between equal distances, because guesses themselves have no order.
+    # The index decides between equal distances, because guesses cannot be compared.
     for _, place, guess in heapq.nsmallest(REFINED, guesses):
         yield from question.attempt(candidates[place], guess)
     if len(question.items) < FEW:
@@ -310,7 +310,7 @@ class FittedSize(NamedTuple):
     value: float
     change: float  # relative change in the last round
     without: float  # largest distance before the fit, in units of last digits
-    left: float  # the one that remains if gaits change in proportion to the parameter
+    left: float  # the distance that remains if gaits change in proportion to the parameter
 
 
 def fit(
@@ -356,7 +356,7 @@ def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
 
 
 def at_the_start(question: Question) -> Iterator[Explanation]:
-    """Yield that a script meets the event at the start, if the multipliers have a -1 that the gait has not."""
+    """Yield the explanation that a script detects the event at its start, if a -1 is printed and the gait has none."""
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
     if minus_one and len(question.reproduced(question.right, others)) == len(others):
@@ -365,7 +365,7 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
 
 
 def conventions(question: Question) -> Iterator[Explanation]:
-    """Yield other conventions under which the right gait has every printed digit, those with the fewest changes."""
+    """Yield the other conventions with the fewest changes under which the right gait has every printed digit."""
     found: dict[str, int] = {}
     for what, walk in scenes(question):
         for other in (question.convention, *alternatives(question.convention)):
@@ -396,7 +396,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
 
 
 def misprinted_values(question: Question) -> Iterator[Explanation]:
-    """Yield explanations by one value with a lost sign or transposed digits, if all but multipliers are right."""
+    """Yield explanations by a lost sign or exchanged digits in one value, if all others but multipliers are right."""
     items = [item for item in question.items if item.quantity != "multipliers"]
     values = question.right.values(items, question.convention)
     wrong = [item for item in items if not item.fits(values[item.name])]

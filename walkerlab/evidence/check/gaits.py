@@ -56,14 +56,14 @@ BEFORE: Instant = "before-strike"
 Values = dict[str, complex | None]
 """Values of printed numbers by name, or None if a gait has none."""
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
-"""Power of rates in which a quantity scales with the unit of time."""
+"""Exponent of 1/s in the unit of a quantity."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
 # Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
 DIFFERENCE = 1e-6
 MAX_MOVES = 16
 SMALLEST_MOVE = 1e-13
-MAX_RESIDUAL = 1e-11  # residual of a gait, which rounding may leave
+MAX_RESIDUAL = 1e-11  # largest residual of a gait, due to rounding
 SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is computed again
 
 

@@ -70,7 +70,7 @@ NO_PART: Final = LegPart(0.0, 0j, 0.0)
 class PlainWalker:
     """A walker on its slope, and the mistakes in its equations. SI units."""
 
-    parts: tuple[LegPart, LegPart]  # of one leg: thigh and shank, or the whole leg and no part
+    parts: tuple[LegPart, LegPart]  # parts of one leg: thigh and shank, or the whole leg and NO_PART
     knee: complex  # m, from hip to knee; 0 for straight legs
     hip_mass: float
     foot: complex  # m, from hip to the centre of the foot's arc, leg upright
@@ -395,7 +395,7 @@ def swing_until(
 
 
 def course(walker: PlainWalker, phase: str, state: Floats, tolerance: float) -> Iterator[tuple[float, Floats]]:
-    """Yield the times and states to which the steps of an integration lead."""
+    """Yield time and state after each step of an integration."""
     latest = LONGEST_SWING * walker.pendulum_time
     if walker.euler_step:
         for count in range(1, min(int(latest / walker.euler_step), MAX_EULER_STEPS)):
@@ -420,7 +420,7 @@ def new_solver(walker: PlainWalker, phase: str, state: Floats, end: float, toler
 def locate(
     walker: PlainWalker, phase: str, state: Floats, event: Event, move: float, tolerance: float
 ) -> tuple[float, Floats]:
-    """Return when and in which state an event is zero, by Newton's method. The first guess is a time `move`."""
+    """Find the time and state at which an event is zero, by Newton's method. The first guess is a time `move`."""
     time = 0.0
     for _ in range(LOCATING_ROUNDS):
         time += move
@@ -482,10 +482,10 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
 class Mistake(NamedTuple):
     """A mistake that is known from publications and programs."""
 
-    what: str  # ends a sentence that begins with 'All printed values follow if'; with a place {} for a size
+    what: str  # ends a sentence that begins with 'All printed values follow if'; {} stands for the size
     of_size: Callable[[float], PlainWalker]  # walker with the mistake
-    first: float = 0.0  # a size to begin with, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # of sizes; smaller ones are within a program's own errors
+    first: float = 0.0  # initial size, or 0 if the mistake has no size
+    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest; smaller ones are within a program's errors
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:

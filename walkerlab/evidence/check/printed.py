@@ -1,4 +1,4 @@
-"""Printed numbers beside right ones: the number of digits that agree, and the verdict."""
+"""Printed numbers next to the right ones: the number of digits that agree, and the verdict."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_DECIMALS: Final = 12
 
 
 class Verdict(StrEnum):
-    """Verdict on a printed number. Some are of the study alone, which has its own scene and its own contradictions."""
+    """Verdict on a printed number. Some are for the study alone, which has its own scene and contradictions."""
 
     INPUT = "input"  # of the study: used as given
     REPRODUCED = "reproduced"

@@ -106,7 +106,7 @@ def follow(explanation: Row, rows: Sequence[Row]) -> str:
 
 
 def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
-    """Enumerate printed values; a long state that is complete is mentioned as a whole."""
+    """Enumerate printed values. A long state that is complete is mentioned as a whole."""
     state = [row["name"] for row in rows if row["name"].startswith("state.")]
     whole = len(state) > LONGEST_LIST and set(state).issubset(names)
     words = [spell_name(name) for name in names if not (whole and name in state)]

@@ -69,7 +69,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
 
 @dataclass(frozen=True)
 class Judge:
-    """Judge of the paper's numbers, by measurements on a config's scene and on the paper's own."""
+    """Judges the paper's numbers by measurements on a config's scene and on the paper's own."""
 
     measured: Measured
     study: PaperStudy
@@ -231,7 +231,7 @@ class Judge:
 
 
 def verdict_on(entry: Printed, values: Iterable[float | None], otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
-    """Return the verdict on a printed value that is reproduced if one of some values has all of its digits."""
+    """Return the verdict on a printed value, which counts as reproduced if any of some values has all of its digits."""
     return Verdict.REPRODUCED if any(map(entry.fits, values)) else otherwise
 
 

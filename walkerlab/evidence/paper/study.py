@@ -164,7 +164,7 @@ def study_the_paper() -> PaperStudy:
 
 
 def settle(walker: RigidWalker) -> State:
-    """Return the stable gait to which walks from x_p converge."""
+    """Return the stable gait on which walks from x_p settle."""
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), X_P_SETTLING_STEPS)
     if walk.steps < X_P_SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")

@@ -34,7 +34,7 @@ START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
-# the same for sampled angles: these have kinks at heel strikes, which a larger step would move past samples
+# the same for sampled angles; smaller, because a larger step would move their kinks at heel strikes past samples
 SAMPLED_STEP: Final = 1e-5
 # predictions cached, because search, derivatives and checks ask for the same walks
 KEPT_PREDICTIONS: Final = 16
@@ -283,7 +283,7 @@ class Forecast:
 
 
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
-    """Return the derivatives (d, starts) of the settled start along directions (d, starts) of z (d,)."""
+    """Return the change of the settled start per change of z (d,) along each column of `directions` (d, starts)."""
     h = SETTLING_STEP
     ends = [
         walks.rest_on_ground(z + h * column, p) - walks.rest_on_ground(z - h * column, p) for column in directions.T

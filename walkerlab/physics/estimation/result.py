@@ -148,9 +148,9 @@ class Identification:
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
     sensitivities: tuple[EstimateSensitivity, ...]  # to parameters that are not estimated
     measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
-    leg_differences: tuple[LegDifference, ...] = ()  # of estimated keys of leg 2
+    leg_differences: tuple[LegDifference, ...] = ()  # one for each estimated key of leg 2
     first_leg: FirstLeg | None = None  # None for equal legs
-    # differences if the other leg swings first, unless the data decide between them
+    # differences if the other leg swings first; empty if the data decide which leg does
     other_differences: tuple[LegDifference, ...] = ()
 
     @property

@@ -66,8 +66,8 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
     forms.sines_cosines(system.form, y, s, c)
     push = push_on(system, t, foot, s, c)
     motion = forms.foot_motion(system.form, foot, s, c, y)
-    # The push acts on the foot's material, so its power takes the slip velocity, not the speed of the rolling contact
-    # point.
+    # The push acts on the foot's material, so its power is computed with the slip velocity, not with the speed of
+    # the rolling contact point.
     return push.along * motion.slip + push.upward * motion.vertical_velocity
 
 

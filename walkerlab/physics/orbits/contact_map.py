@@ -459,7 +459,7 @@ class ContactMap(StepMap):
     def take_disturbed_walk(
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
+        """Simulate a walk over foothold heights (m) from the touchdown after z, at which the push acts."""
         site = maps.valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         start = z * self._units[swing % 2]
@@ -502,7 +502,7 @@ class ContactMap(StepMap):
 class AdaptivePads(Stepper):
     """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step.
 
-    pitches_m  initial pitch for each step of a gait; legs that differ have one for the steps of each leg
+    pitches_m  initial pitch for each step of a gait; if the legs differ, one for the steps of each leg
     """
 
     def __init__(

@@ -393,7 +393,7 @@ class LegSwing(NamedTuple):
     section: StrikeSection
     slope: float
     radius: float  # of the stance foot
-    levers: list[tuple[float, float]]  # of each body, to the swing foot
+    levers: list[tuple[float, float]]  # from each body to the swing foot
 
     def step_length(self, before: float, end: Floats) -> float:
         """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
@@ -424,7 +424,7 @@ class SimilarWalker(NamedTuple):
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 
     def swinging(self, swing: int) -> LegSwing:
-        """Return the leg that swings in the step `swing`, as in `Stepper.step`."""
+        """Return the leg that swings in step number `swing`; see `Stepper.step`."""
         return self.swings[swing % len(self.swings)]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:

@@ -38,7 +38,7 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
     "largest_push_forward_N_s": ("hip-push", 1.0),
     "largest_push_backward_N_s": ("hip-push", -1.0),
 }
-"""Disturbance and sign of each largest disturbance that a gait survives."""
+"""For each largest survived disturbance, its kind and its sign."""
 INDICATORS = ("step_period", "step_length", "speed")
 DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks: a stride, if the legs differ
 # Offsets and weights of fourth-order formulas for a first derivative, the most accurate first.
@@ -58,7 +58,7 @@ class GaitOnMap(NamedTuple):
     p: float  # value of the parameter
     z: Floats  # (d,) section coordinates at the start
     A: Floats  # (d, d) derivative of a stride
-    units: Units  # of the walker
+    units: Units  # length, mass and time of the walker, in which states are scaled
     swing: int = 0  # number of steps of the gait before z, as in `Stepper.step`
 
     @property

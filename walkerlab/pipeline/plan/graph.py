@@ -77,7 +77,7 @@ STAGES = tuple(by_name.values())
 
 
 def complete(drawing: Stage) -> Stage:
-    """Add to a drawing the stages that declare that it needs or shows their results.
+    """Add to a drawing's inputs the stages that say that the drawing needs or shows their results.
 
     A stage whose block has its own name is needed only by configs with that block.
     """

@@ -19,7 +19,7 @@ from walkerlab.pipeline.store.runs import SHOWN_CHANGES, RunFolder, config_text,
 
 SUFFIX = ".h5"
 BUILTIN = "built-in "
-"""Begin of the source of a run with a built-in config."""
+"""Prefix of the source of a run with a built-in config."""
 
 
 @dataclass(frozen=True)

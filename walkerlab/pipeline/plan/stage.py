@@ -137,7 +137,7 @@ class Stage:
     # "module:name" of the `Offer` of the stage's command; empty for the usual one, which works on a run
     adds_command: str = ""
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
-    shown_by: tuple[str, ...] = ()  # those that show it if it is current
+    shown_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that show this one's result if it is current
 
     def takes_under(self, config: Config) -> type | None:
         """Return the type of the config slice that the stage's result depends on, or None for the whole config."""

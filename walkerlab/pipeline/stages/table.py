@@ -115,7 +115,7 @@ QUESTIONS = (
             Option("--level", "identify.level", "steps|angles", "Kind of data."),
             Option("--first-leg", "identify.first_leg", "1|2", "Leg of the first step in a table of steps.", "int"),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
-            Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", "switch"),
+            Option("--robustness", "identify.robustness", "", "Also report the gait's sensitivity.", "switch"),
             *recording_options("identify"),
             Option("--plan", "", "", "Without data: predict the errors of each way to measure.", "switch", runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),

@@ -87,7 +87,7 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
 
 
 def steps_later(first: Summary, second: Summary) -> int | None:
-    """Return the delay (steps) until a repeated walk repeats its steps like the first, or None if either never does."""
+    """Return how many steps later the second walk takes the steps of the first one's cycle, or None without cycles."""
     period = first.get("repeats_after") or 0
     if not period or second.get("repeats_after") != period:
         return None
@@ -371,8 +371,9 @@ def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
 
 
 def steps_to_repeat_last(steps: Floats) -> int:
-    """Return the number of steps after which the last steps (steps, n) repeat, or 0. The longest part that repeats
-    counts.
+    """Return the period, in steps, with which the end of a walk (steps, n) repeats, or 0.
+
+    The longest repeating part counts.
     """
     longest = max(MAX_REPEATED, len(steps) // 4)
     ends = (longest >> halvings for halvings in range(longest.bit_length()))

@@ -23,7 +23,7 @@ from walkerlab.pipeline.store.files import storing
 from walkerlab.private_files import make_private, make_private_folder, may_be_foreign
 
 LISTING_S: Final = 5.0
-"""Minimum time between two questions to Slurm's queue."""
+"""Minimum time between two queries of Slurm's queue."""
 RESULT_S: Final = 30.0
 """Time after a job's end in which its result may still appear on a network disk."""
 RESTART_S: Final = 20.0
@@ -135,7 +135,7 @@ class DaskWorkers:
         self.client = client
         self.count = count
         self._lock = threading.Lock()
-        self._seen_at = time.monotonic()  # when there was a worker
+        self._seen_at = time.monotonic()  # last time at which there was a worker
 
     def wait(self, job: Any) -> None:
         """Wait until a job has ended, and start the workers again if there has been none for a while."""
@@ -166,7 +166,7 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
             private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
         )
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
-    # It asserts the types of options.
+    # submitit asserts the types of options.
     except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
@@ -210,11 +210,11 @@ class SlurmQueue:
     """
 
     def __init__(self, time_limit: str) -> None:
-        """Start without asking. `time_limit` is that of the jobs (min)."""
+        """Send no query yet. `time_limit` is that of the jobs (min)."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
-        # The first question is asked at once.
+        # The first query is sent at once.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:

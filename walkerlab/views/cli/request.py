@@ -96,7 +96,7 @@ class Request:
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     graph: Graph = PIPELINE  # the stages of the program
-    full: bool = switch("--full", help="Run the long campaign too; if interrupted, it resumes the next time.")
+    full: bool = switch("--full", help="Also run the long campaign; an interrupted one resumes the next time.")
     config: str | None = option(
         "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
         help="Config file, built-in config, or run by its name or folder; default: paper.",

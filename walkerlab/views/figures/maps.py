@@ -47,7 +47,7 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
 
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
-    """Return colour and label of each outcome that occurs."""
+    """Return colour and label of each outcome that occurs in a map."""
     return [(OUTCOME_TEXTS[item].colour, item.label) for item in map(Outcome, np.unique(outcomes).tolist())]
 
 

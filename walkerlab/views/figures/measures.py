@@ -257,7 +257,7 @@ def clear(dimension: Length, second: Length, length: float) -> bool:
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
-    """Return label heights as close to the wanted ones as possible, raised where the labels below need room."""
+    """Return label heights as close as possible to the preferred ones, raised where the labels below need room."""
     spread_heights = list(heights)
     for place in sorted(range(len(spread_heights)), key=spread_heights.__getitem__):
         spread_heights[place] = max(spread_heights[place], lowest + 0.5 * sizes[place])

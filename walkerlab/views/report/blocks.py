@@ -236,9 +236,7 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and that of the paper: none if both are equal, None if they were
-        not compared.
-        """
+        """Differences between this scene and the paper's: empty if there are none, None if they were not compared."""
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 

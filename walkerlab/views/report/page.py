@@ -72,7 +72,7 @@ MAX_BYTES = 1_400_000
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """Choose SVG files, or PNG for the largest until all fit in `most` bytes.
+    """Choose SVG files, replacing the largest by PNG until all fit in `most` bytes.
 
     Raises FileNotFoundError if one is missing.
     """
