@@ -32,7 +32,7 @@ from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.hybrid.rigid_record import new_observer
-from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.impact import push_at_hip
 from walkerlab.physics.mechanics.rigid_model import step_lengths
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
 from walkerlab.physics.orbits.rigid_map import state_on_section, unit_kicks
@@ -97,7 +97,7 @@ def pushed_walk(walks, z, p, push, draw):
         time = np.array([MIDDLE * walks.step(z, p).period_s / unit.units.time])
         observer = new_observer(time, start.size)
         walks._exact.walk(unit.section, z, 1, False, start=start, observer=observer)
-        return [(0.0, start), (time[0], pushed_at_hip(unit.walker, observer.states[0], push * draw.normal()))]
+        return [(0.0, start), (time[0], push_at_hip(unit.walker, observer.states[0], push * draw.normal()))]
 
     return walk_in_parts(walks, unit, z, halves)
 

@@ -22,7 +22,7 @@ from walkerlab.physics.estimation.information import information_on, marginalise
 from walkerlab.physics.estimation.judgement import alternates, describe_limp, judge, measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
-from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
+from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, effective_directions
 from walkerlab.physics.estimation.result import (
     USABLE,
     Estimate,
@@ -277,7 +277,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family, measured.first_leg)
     z = gait_start(subject, family, measured.first_leg)
-    directions = felt_directions(walks, z, family.start)
+    directions = effective_directions(walks, z, family.start)
     forecast = Forecast(
         measured=measured,
         nuisances=question.sensors,

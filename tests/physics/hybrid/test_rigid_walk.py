@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled, impact
 from walkerlab.outcome import Outcome
-from walkerlab.physics.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, far_from
+from walkerlab.physics.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, are_far_from
 from walkerlab.physics.hybrid.recorded_walk import take_walk as take_walk_of_model
 from walkerlab.physics.hybrid.rigid_measures import energies as energies_of_model
 from walkerlab.physics.hybrid.rigid_measures import reactions as reactions_of_model
@@ -235,8 +235,8 @@ def test_standing_with_legs_together_is_not_a_heel_strike():
 
 def test_samples_near_events_are_excluded():
     times = np.array([0.0, 0.99, 1.0, 1.02, 2.0, 3.5])
-    assert far_from(times, np.array([1.0, 2.01]), 0.015).tolist() == [True, False, False, True, False, True]
-    assert far_from(times, np.zeros(0), 1.0).all()
+    assert are_far_from(times, np.array([1.0, 2.01]), 0.015).tolist() == [True, False, False, True, False, True]
+    assert are_far_from(times, np.zeros(0), 1.0).all()
 
 
 def test_as_state_returns_plain_floats():

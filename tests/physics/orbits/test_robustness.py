@@ -10,7 +10,7 @@ from plain_rigid_walk import plain_walk
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.walk_record import rough_heights
-from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.impact import push_at_hip
 from walkerlab.physics.mechanics.rigid_model import energies, equations, momentum
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import GAIT_QUANTITIES, gait_quantities, gradients
@@ -118,7 +118,7 @@ def test_hip_push_keeps_the_foot_fixed_and_acts_along_the_hip_lever():
     at = standpoint("slope-3deg")
     walker = at.step_map._unit_at(at.p).walker
     y = np.array(state_on_section(walker, at.z))
-    pushed = pushed_at_hip(walker, y, 1e-3)
+    pushed = push_at_hip(walker, y, 1e-3)
     np.testing.assert_array_equal(pushed[: y.size // 2], y[: y.size // 2])
     # work of an impulse: the mean velocity of the hip along the slope, before and after
     height = walker.radius + np.cos(y[1] + walker.slope) * walker.hip_y
@@ -132,7 +132,7 @@ def test_hip_push_comes_after_the_release_of_the_trailing_knee():
     at = standpoint("kneed")
     walker = at.step_map._unit_at(at.p).walker
     n, y = len(walker.arm_x), np.array(state_on_section(walker, at.z))
-    change = (pushed_at_hip(walker, y, 1e-3) - y)[n:]
+    change = (push_at_hip(walker, y, 1e-3) - y)[n:]
     assert abs(change[walker.shank] - change[walker.thigh]) > 1e-4
     M, r, s, c, F, U = np.zeros((n, n)), *np.zeros((5, n))
     equations(walker, y, s, c, F, U, M, r)

@@ -11,7 +11,7 @@ from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_measures import reactions
-from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.impact import push_at_hip
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
@@ -137,7 +137,7 @@ def test_push_reports_whether_the_ground_still_pushes(rigid, both):
     assert "During the largest push backward the ground would have to pull with" in said
     config = load(Path("slope-3deg")).config
     walker, gait = rigid_walker(config), fixedpoint.run(config, {}, Silent()).summary["state"]
-    pushed = pushed_at_hip(walker, np.array(gait), -push["backward_N_s"])
+    pushed = push_at_hip(walker, np.array(gait), -push["backward_N_s"])
     walk = take_walk(walker, EXACT_STEPS, tuple(pushed), 50, sampled=True)
     lowest = reactions(walker, walk.samples.state)[:, 1].min()
     assert push["backward_min_normal_force_N"] == pytest.approx(lowest, abs=0.05)

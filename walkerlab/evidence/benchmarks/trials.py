@@ -17,7 +17,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.contact_result import walk_contact
 from walkerlab.physics.hybrid.contact_state import JudgedGround
-from walkerlab.physics.hybrid.rigid_record import unwatched
+from walkerlab.physics.hybrid.rigid_record import new_idle_observer
 from walkerlab.physics.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.physics.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.physics.kernels import uncompiled
@@ -138,7 +138,7 @@ class RigidTrial:
         solver = entry.new(n, rtol, atol, budget)
         finder = finder_for(solver, RIGID_EVENTS, n)
         walker = models_in_turn(self.walker)
-        observer = unwatched()
+        observer = new_idle_observer()
         strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
         stride = walk if entry.compiled else uncompiled(walk)
 

@@ -36,7 +36,7 @@ MIN_LIKELIHOOD_GAIN: Final = 3.0
 # log-likelihood rises by less than LIKELIHOOD_TOLERANCE.
 NOISE_TOLERANCE: Final = 1e-2
 LIKELIHOOD_TOLERANCE: Final = 1e-2
-# change of a converged unknown, in standard errors
+# largest change of a converged unknown, in standard errors
 MOVE_TOLERANCE: Final = 0.1
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
 # smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
@@ -48,7 +48,7 @@ EVALUATIONS: Final = 12  # maximum number of evaluations per round
 FIT_TOLERANCE: Final = 1e-6
 SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
-# standard deviation of a weak prior about the start for each scaled unknown; it holds undetermined combinations there
+# standard deviation of a weak prior on each scaled unknown; it keeps undetermined combinations near the start
 WEAK_PRIOR: Final = 1.0
 # efficiency of the soft_l1 loss for normal noise: E[psi']^2 / E[psi^2] with psi(x) = x / sqrt(1 + x^2)
 SOFT_EFFICIENCY: Final = 0.9268
@@ -198,7 +198,7 @@ def fit(
         if forecast.walks_taken > problem.max_walks:
             end = FitEnd.OUT_OF_WALKS
             break
-    # The errors follow from these derivatives, so they are exact unless a slightly changed walk ends early.
+    # The errors follow from these derivatives, so compute them exactly, unless a slightly changed walk ends early.
     data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
@@ -207,8 +207,9 @@ def fit(
 
 
 def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
-    """Fit another problem to the walk of a fit, from a start (unknowns,): the unknowns with the noise of that fit, then
-    the standard deviations. Returns None if a walk ends early.
+    """Fit another problem to the walk that `like` fits, from a start (unknowns,).
+
+    The unknowns are fitted with the noise of `like`, then the standard deviations. Returns None if a walk ends early.
     """
     data = linearise(problem, start, like.disturbances)
     if data is None:
@@ -218,8 +219,9 @@ def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
 
 
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
-    """Estimate the standard deviations at u (unknowns,), starting from another fit, or return None if a
-    walk ends early.
+    """Estimate the standard deviations at u (unknowns,), starting from those of the fit `like`.
+
+    Returns None if a walk ends early.
     """
     problem = like.problem
     data = linearise(problem, u, like.disturbances, robust=robust_at(like.rows, like.noise))

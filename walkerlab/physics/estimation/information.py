@@ -44,7 +44,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     result = replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
     groups = fitted.forecast.half_steps
     if not groups.size:
-        # Floor and kicks move the estimates by different amounts, and a short walk hardly tells which of them it was.
+        # Floor and kicks move the estimates by different amounts, and a short walk hardly shows which of them acted.
         average = average_covariance(fitted, likely_noises(fitted), basis)
         root = np.linalg.cholesky(basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T)
         inverse = np.linalg.inv(root)
@@ -57,9 +57,11 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
 
 
 def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
-    """Return the covariance (unknowns, unknowns) of unknowns that change only along columns (unknowns, n).
+    """Return the covariance (unknowns, unknowns) of unknowns that change only along the columns of `along`.
 
-    Errors of successive angles may go together. They count as independent from one half step, and one leg, to the next.
+    along  (unknowns, n)
+
+    Errors of successive angles may be correlated; only those of different half steps, or legs, count as independent.
     This is the sandwich estimator with jackknifed groups (CR3), where it is larger than the covariance of independent
     errors. Without angles over time, all errors are independent.
 
@@ -78,7 +80,7 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
     meat = root.T @ fitted.rows.prior[1:, 1:] @ root
     count = groups.max() + 1
     for rows in (groups == group for group in range(count)):
-        # as if the fit had not followed the residuals of this group
+        # The fit has followed the residuals of this group. The matrix undoes that.
         score = np.linalg.solve(np.eye(len(meat)) - J[rows].T @ J[rows], J[rows].T @ residuals[rows])
         meat += (1.0 - 1.0 / count) * np.outer(score, score)
     return widen(root, meat)
@@ -92,7 +94,7 @@ def widen(root: Floats, meat: Floats) -> Floats:
 
 
 def in_units(covariance: Floats, scales: Floats) -> dict[str, Any]:
-    """Return the covariance and the correlations of parameters from the covariance of scaled ones."""
+    """Return the covariance and the correlations of the parameters from the covariance of the scaled parameters."""
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return {"covariance": covariance * np.outer(scales, scales), "correlations": covariance / np.outer(errors, errors)}
 
@@ -136,7 +138,7 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
 
     # The seed is fixed, so that the same walk always gives the same error.
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
-    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
+    logs = centre + np.where(draws < 0.0, *(draws * reach for reach in plausible_noise_range(evaluate_at, centre)))
     return average_covariance(fitted, noise_at(logs, sources), basis)
 
 
@@ -155,14 +157,17 @@ def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:
     drawn = evaluate(fitted.rows, noises)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
     moved = (drawn.move - fitted.evaluation.move)[:, :count] @ basis.T
-    # Law of total variance: the estimate itself moves with the standard deviations.
+    # The estimate itself depends on the standard deviations, so its variance counts, too (law of total variance).
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
 
 
-def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> tuple[Floats, Floats]:
-    """Return the plausible ranges below and above `centre` (deviations,), the logarithms of standard deviations."""
+def plausible_noise_range(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> tuple[Floats, Floats]:
+    """Return how far below and above `centre` the logarithms of the standard deviations plausibly lie.
+
+    All have shape (deviations,).
+    """
     moves = NOISE_LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
     likelihoods = evaluate_at(centre + moves).restricted
     above = likelihoods[1 : 1 + centre.size]

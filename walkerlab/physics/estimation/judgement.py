@@ -20,12 +20,12 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-# fraction of a quantity's size; the residual of a missed heel strike is far larger
+# Smaller residuals, as a fraction of a quantity's size, are no outliers. That of a missed heel strike is far larger.
 SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference that suggests a key of leg 2
 PHASE_BINS: Final = 20
-# fraction of the leg length; the floor of a laboratory is rough by about 0.001
+# fraction of the leg length. The floor of a laboratory has about 0.001.
 UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
 # largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
@@ -79,12 +79,12 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
 
 
 def alternates(fitted: Fitted) -> bool:
-    """Whether a quantity of odd and even steps differs from the model's, which a rough floor may explain, too."""
+    """Whether odd and even steps differ from the model by different amounts. A rough floor may explain that, too."""
     return any(each > NOTABLE_ALTERNATION for each in alternations(fitted, fitted.data.residuals).values())
 
 
 def describe_limp(fitted: Fitted) -> str:
-    """Describe by how much a quantity of odd and even steps differs from the model's, or return '' if it does not."""
+    """Describe a quantity whose residuals alternate from step to step, or return '' if there is none."""
     white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
     for quantity, alternation in alternations(fitted, white).items():
         if alternation > ALTERNATION:
@@ -94,7 +94,7 @@ def describe_limp(fitted: Fitted) -> str:
 
 
 def alternations(fitted: Fitted, residuals: Floats) -> dict[str, float]:
-    """Return the difference between odd and even steps of each quantity of a step, in standard deviations."""
+    """Return, by quantity of a step, how much the residuals of odd and even steps differ, in standard deviations."""
     steps = fitted.forecast.measured.count
     channels = enumerate(fitted.forecast.channels)
     return {quantity: alternation_of(residuals[index * steps : (index + 1) * steps]) for index, quantity in channels}
@@ -151,7 +151,10 @@ def alternation_of(residuals: Floats) -> float:
 
 
 def phase_means(fitted: Fitted) -> Floats:
-    """Return the angles' mean residual (phases, 2) at each phase over the most probable floor, swing leg first."""
+    """Return the mean residual (phases, 2) of the angles at each phase, over the most probable floor.
+
+    The swing leg is column 0.
+    """
     measured = fitted.forecast.measured
     residuals = fitted.residuals[-measured.angles_rad.size :].reshape(-1, 2)
     # The legs exchange roles at every heel strike.
@@ -179,7 +182,7 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     for each in (before, after):
         for first in range(stride):
             each[..., first::stride, :] -= each[..., first::stride, :].mean(axis=-2, keepdims=True)
-    # In units of its own scatter, no quantity is lost in the pseudo-inverse, whatever its unit.
+    # In units of their scatter all quantities are of the same size, so the pseudo-inverse drops none of them.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     before, after = before / scale, after / scale
     products = np.swapaxes(before, -1, -2) @ before
@@ -188,10 +191,10 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
 
 
 def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | None:
-    """Measure the spectral radius from periods, lengths and angles of successive steps, or None for fewer than 8 steps.
+    """Measure the spectral radius from periods, lengths and angles of successive steps.
 
-    Bias and standard error are those of the same estimate for walks of the fitted model, with its disturbances and its
-    noise, whose spectral radius is known.
+    The spectral radius of the fitted model is known. So the same estimate for simulated walks of this model, with the
+    fitted disturbances and noise, shows bias and standard error. Returns None for fewer than 8 steps.
 
     fitted_radius  spectral radius of the fitted walker
     """

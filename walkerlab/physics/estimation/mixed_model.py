@@ -19,11 +19,11 @@ from walkerlab.physics.solvers.system import Floats
 
 NOISE_FACTORS: Final = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
-"""Candidate starts of the search: multiples of the current measurement noise, and disturbances as fractions, roughness
-of the leg length and kicks of the rates."""
-# bounds on roughness and kicks, as the same fractions
+"""Starts of the search: measurement noises as multiples of the current one, and disturbances as fractions. Roughness is
+a fraction of the leg length, and kicks are fractions of the rates."""
+# bounds on roughness and kicks, as these fractions
 DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)
-# the same fraction; a smaller disturbance cannot be told from none
+# as such a fraction; a smaller disturbance cannot be distinguished from none
 NEGLIGIBLE_DISTURBANCE: Final = 1e-5
 NOISE_RATIO: Final = 1.0
 """Prior standard deviation of the logarithm of the quantities' relative noises.
@@ -36,8 +36,8 @@ Source: Chung et al., A nondegenerate penalized likelihood estimator for varianc
 Psychometrika 78 (2013).
 """
 NOISE_SEARCH: Final = {"ftol": 1e-7, "gtol": 1e-2}
-"""The search ends when the likelihood changes by less than this (relative), or its slope in the logarithms does."""
-# of all noise levels that are evaluated together, which limits the memory
+"""The search ends when the likelihood changes by less than `ftol` (relative), or when its slope is below `gtol`."""
+# number of entries in the matrices of all noise levels that are evaluated together, a limit on the memory
 MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
 MIN_GAINS: Final = (1e-6, 0.5)
@@ -51,7 +51,7 @@ class Noise(NamedTuple):
 
     measurement: Floats  # (quantities,)
     roughness_m: Any  # a float, or an array (...,) for several sets of standard deviations
-    kick: Any = 0.0  # likewise, as a fraction of the rates
+    kick: Any = 0.0  # as a fraction of the rates, a float or an array like `roughness_m`
 
     @property
     def process(self) -> Floats:
@@ -59,7 +59,7 @@ class Noise(NamedTuple):
         return np.stack(np.broadcast_arrays(self.roughness_m, self.kick), axis=-1)
 
     def spread(self, disturbances: int, kicks: int) -> Floats:
-        """Return the standard deviations (disturbances,) of heights and kicks, of which `kicks` are kicks."""
+        """Return the standard deviation of each disturbance (disturbances,): heights first, then `kicks` kicks."""
         return np.repeat(self.process, (disturbances - kicks, kicks))
 
 
@@ -176,7 +176,10 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
 
 
 def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
-    """Return the logarithm of the prior density (...,) of noises (..., quantities), and its slope in log noises."""
+    """Return the logarithm of the prior density (...,) of noises, and its derivatives with respect to their logarithms.
+
+    deviations  (..., quantities) standard deviations of the measurement
+    """
     relative = np.log(deviations / rows.sizes)
     alone = rows.sizes.size == 1
     centred = relative - relative.mean(axis=-1, keepdims=True)
@@ -185,7 +188,9 @@ def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
 
 
 def restricted_with_slope(rows: Reduced, noise: Noise) -> tuple[float, Floats]:
-    """Return the restricted likelihood of one noise level, and its slope in the logarithms (quantities + 2,).
+    """Return the restricted log-likelihood of one noise level, and its slope (quantities + 2,).
+
+    The slope is with respect to the logarithms of the standard deviations.
 
     Source: Lindstrom and Bates, J. Am. Stat. Assoc. 83 (1988), with P = V^-1 - V^-1 J (J^T V^-1 J)^-1 J^T V^-1.
     """
@@ -275,7 +280,7 @@ def noise_by_disturbances(
     for sources in rows.disturbance_sets():
         starts = [np.append(row, level) for row in measured for level in levels] if sources else [np.log(middle)]
         if len(sources) == 2:
-            # start where one disturbance alone explains the walk best, and add the other one
+            # Start where one disturbance alone explains the walk best, and add the other one.
             starts = [np.insert(logs[(0,)], middle.size + 1, level) for level in levels]
             starts += [np.insert(logs[(1,)], middle.size, level) for level in levels]
         before = (start.process / units)[list(sources)]

@@ -34,9 +34,9 @@ START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
-# the same for sampled angles; smaller, because a larger step would move their kinks at heel strikes past samples
+# The same step for sampled angles. A larger one would move their kinks at heel strikes past samples.
 SAMPLED_STEP: Final = 1e-5
-# predictions cached, because search, derivatives and checks ask for the same walks
+# number of cached predictions; search, derivatives and checks ask for the same walks
 KEPT_PREDICTIONS: Final = 16
 
 
@@ -60,16 +60,19 @@ class WalkMap(Protocol):
     def differentiate_walk(
         self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ..., kicked: bool = ...
     ) -> VariedWalk | None:
-        """Differentiate the walk and its samples along columns (d + steps + 1, columns), and by kicks if `kicked`."""
+        """Differentiate the walk and its samples along each column of `along` and, if `kicked`, with respect to kicks.
+
+        along  (d + steps + 1, columns) changes of z and of the heights (m)
+        """
 
 
 class Prediction(NamedTuple):
-    """A predicted walk. Its arrays are shared, so they are never written to."""
+    """A predicted walk. Never write to its arrays, because callers share them."""
 
     values: Floats  # (values,) predicted values
     walk: DisturbedWalk
     times_s: Floats  # (samples,) times of angle samples from the walk's first heel strike
-    inside: NDArray[np.bool_]  # (samples,) whether they are within the walk
+    inside: NDArray[np.bool_]  # (samples,) whether each sample is within the walk
     angles_rad: Floats  # (samples, 2) predicted angles without the sensors' offset and gain
 
 
@@ -77,8 +80,9 @@ class Prediction(NamedTuple):
 class Readings:
     """The measured values of a walk, and how clock and sensors would show a predicted one.
 
-    If `in_phase`, angles are compared at fractions of each step, so that fits converge from a poor first guess; if not,
-    at their sample times, which do not depend on measured heel strikes, and periods do not count as measured values.
+    If `in_phase`, angles are compared at fractions of each step, so that fits converge from a poor first guess.
+    Otherwise they are compared at their sample times, which do not depend on measured heel strikes, and periods do not
+    count as measured values.
     """
 
     measured: MeasuredWalk
@@ -109,7 +113,7 @@ class Readings:
 
     @cached_property
     def half_steps(self) -> NDArray[np.int64]:
-        """Number (values,) of the half step and leg of each angle, or no values where steps or phases are compared."""
+        """Number (values,) of the half step and leg of each angle. Empty if steps or phases are compared."""
         if self.in_phase or not self.measured.sampled:
             return np.zeros(0, np.int64)
         half = 2 * self.measured.step + (self.measured.phase >= 0.5)
@@ -200,7 +204,7 @@ class Forecast(Readings):
 
     @cached_property
     def _recent(self) -> Any:
-        # arrays cannot be keys, so their bytes are
+        # Arrays cannot be keys of a cache, but their bytes can.
         @lru_cache(KEPT_PREDICTIONS)
         def predict(u: bytes, heights_m: bytes) -> Prediction | None:
             return self._predict(np.frombuffer(u), np.frombuffer(heights_m))
@@ -229,7 +233,8 @@ class Forecast(Readings):
         exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
         disturbed  whether to differentiate with respect to the disturbances, too
         """
-        # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
+        # Derivatives with respect to parameters are difference quotients of exact walks. The others follow from tangent
+        # columns.
         prediction = self.predict(u, heights_m)
         starts = self.directions.shape[1]
         if prediction is None:
@@ -259,13 +264,16 @@ class Forecast(Readings):
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
     ) -> tuple[Floats, Floats] | None:
-        """Return derivatives for start and disturbances, (values, columns), and for sensors, (values, nuisances)."""
+        """Return derivatives with respect to start and disturbances (values, columns), and sensors (values, nuisances).
+
+        lifts  (heights, n) changes of the heights (m) in each disturbance
+        """
         sensors = self.sensors(u)
         walk = prediction.walk
         z = self.start(u)
         starts = self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
-        settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
+        settling = differentiate_settling(self.walks, self._unsettled(u), self.parameters(u), self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
         kicked = self.kicked and lifts.size > 0
         varied = self.walks.differentiate_walk(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
@@ -273,7 +281,7 @@ class Forecast(Readings):
             return None
         angles = prediction.angles_rad
         count = self.measured.count
-        # A sample outside the walk is taken at its nearest end, whatever its time.
+        # A sample outside the walk is taken at the nearest end of the walk, so its time has no effect.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = (
             varied.samples_rad * sensors[GAIN]
@@ -292,7 +300,7 @@ class Forecast(Readings):
         return moves, by_sensor
 
 
-def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
+def differentiate_settling(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
     """Return the change of the settled start per change of z (d,) along each column of `directions` (d, starts)."""
     h = SETTLING_STEP
     ends = [
@@ -301,8 +309,8 @@ def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Flo
     return np.array(ends).reshape(-1, z.size).T / (2.0 * h)
 
 
-def felt_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
+def effective_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
     """Return the directions (d, starts) in which a change of the start z (d,) affects the next step."""
     DP = walks.step(walks.rest_on_ground(z, p), p).DP
-    _, sizes, rows = np.linalg.svd(DP @ settling_along(walks, z, p, np.eye(z.size)))
+    _, sizes, rows = np.linalg.svd(DP @ differentiate_settling(walks, z, p, np.eye(z.size)))
     return np.asarray(rows[sizes > MIN_EFFECT * max(1.0, sizes[0])].T)

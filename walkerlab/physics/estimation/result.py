@@ -93,9 +93,9 @@ class EstimateSensitivity:
 
     estimate: str  # key of the estimate
     to: str  # key of the fixed parameter
-    per_percent: float  # in the estimate's unit
+    per_percent: float  # change of the estimate, in its unit
     unit: str
-    change: float  # of the fixed parameter, in its unit: 1 % of it, or of the leg if it is zero
+    change: float  # change of the fixed parameter, in its unit: 1 % of it, or of the leg if it is zero
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Identification:
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
-    sensitivities: tuple[EstimateSensitivity, ...]  # to parameters that are not estimated
+    sensitivities: tuple[EstimateSensitivity, ...]  # sensitivities to parameters that are not estimated
     measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
     leg_differences: tuple[LegDifference, ...] = ()  # one for each estimated key of leg 2
     first_leg: FirstLeg | None = None  # None for equal legs

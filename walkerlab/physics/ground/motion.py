@@ -19,8 +19,9 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 
 @forced_inline
 def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Compute the force of ground and push-off on a foot, along and normal to the slope (N), and add its
-    torques to r.
+    """Compute the force of ground and push-off on a foot, along and normal to the slope (N).
+
+    The torques of this force are added to r (n,).
     """
     form = system.form
     push = push_on(system, t, foot, s, c)
@@ -94,7 +95,10 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate and slip with respect to y[j]. F, U (n,) are projected levers."""
+    """Differentiate a foot's penetration, its rate and the slip with respect to y[j].
+
+    F, U  (n,) levers from the root to the foot, projected on the slope and on its normal
+    """
     p = form.places
     half = forms.half_size(form)
     moves = j >= half

@@ -65,8 +65,9 @@ def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[
 
 @kernel_part
 def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Compute derivatives (N/rad) of a push with respect to the angle of a body. The push changes direction, not
-    magnitude.
+    """Compute the derivatives (N/rad) of a push with respect to the angle of body k.
+
+    The push changes its direction, but not its magnitude.
     """
     forward, upward = lever_to_hip(form, foot, s, c, k)
     # Force per length, times the angle by which the line from foot to hip turns for a unit turn of body k.

@@ -34,9 +34,7 @@ RELEASED, BENT, STOPPING, LOCKED = range(4)
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked. It is a
-    structured scalar.
-    """
+    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked: a structured scalar."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
@@ -146,8 +144,9 @@ PROGRESS = tree.record_type(WalkProgress, {})
 
 
 def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
-    """Create the progress record of a walk that stands on foot `stance` after `steps` steps. The last one ended at
-    `last_touch` (s).
+    """Create the progress record of a walk that stands on foot `stance` after `steps` steps.
+
+    last_touch  s, time at which the last step ended
     """
     progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
     return progress

@@ -23,8 +23,9 @@ from walkerlab.physics.solvers.system import Floats
 def change_form(
     walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
-    """Return the state in the walker's new form after an event. This records the energy lost and updates
-    the tangent.
+    """Return the state in the walker's new form after an event.
+
+    Records the energy lost and updates the tangent.
     """
     # Locks and latches are plastic impacts, a latch also loses the elastic energy of its stop, and a release changes no
     # velocity. The tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg.

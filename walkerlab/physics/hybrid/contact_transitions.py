@@ -44,7 +44,7 @@ def apply_event(
         walk_state.sides[events.PASSING] = -walk_state.sides[events.PASSING]
         outcome = GOES_ON
         for foot in range(2):
-            # in a pinned step, equal legs pass with both feet at the surface; rounding must not decide which is above
+            # In a pinned step, equal legs pass with both feet at the surface. Rounding must not decide which is above.
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(walk_state, foot, above)

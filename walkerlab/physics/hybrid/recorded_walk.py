@@ -227,7 +227,7 @@ class Recorder:
         grid = self.interval * np.arange(self.grid_index, self.grid_index + count, dtype=np.float64)
         self.grid_index += count
         events = np.append(strikes, self.time) if self.steps else strikes
-        kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
+        kept = are_far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
         swing = self.steps + np.arange(strikes.size)
         # A strike has two states, before and after. Adjacent floats as times keep the samples in order.
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
@@ -333,7 +333,7 @@ def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -
     return (*state[:n], *rigid.apply_couplings(walker, rigid.AT_STRIKE, rates).tolist())
 
 
-def far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
+def are_far_from(times: Array, events: Array, distance: float) -> NDArray[np.bool_]:
     if events.size == 0:
         return np.ones(times.size, np.bool_)
     behind = np.searchsorted(events, times).clip(max=events.size - 1)

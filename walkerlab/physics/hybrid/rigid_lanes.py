@@ -385,8 +385,9 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's solver step at which the hip gets too low, or NO_CROSSING if it ends
-    high enough.
+    """Find the fraction of a lane's solver step at which the hip gets too low.
+
+    Returns NO_CROSSING if the hip is high enough at the end of the step.
     """
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END_STATE + 1, lane] + from_upright

@@ -68,7 +68,7 @@ def new_observer(times: Any, state_size: int) -> Observer:
     return Observer(True, times, np.zeros((times.size, state_size)), np.zeros(times.size, np.int64), np.asarray(tally))
 
 
-def unwatched() -> Observer:
+def new_idle_observer() -> Observer:
     return new_observer(np.zeros(0), 0)._replace(watching=False)
 
 
@@ -88,7 +88,7 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
 def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: bool, before: Any, after: Any) -> None:
     """Record a strike's energy loss and its impulse on the new stance foot, without the push-off's impulse.
 
-    following  model of the next step; at a knee strike the model stays
+    following  model of the next step; not used at a knee strike, after which the model is the same
     """
     if observer.watching:
         tally = observer.tally[()]
@@ -184,8 +184,9 @@ def refine_maximum(
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:
-    """Record the last solver step up to `fraction`: its samples, extremes and energy. This overwrites the finder's
-    `row`.
+    """Record the last solver step up to `fraction`: its samples, extremes and energy.
+
+    row  row of the finder that may be overwritten
     """
     tally = observer.tally[()]
     torque = hinge_law(mode.model, HIP_ROW).torque

@@ -38,8 +38,9 @@ def is_bent(system: Mode) -> bool:
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Return the swing knee's angle beyond straight (rad) or its rate. `y[first]` is the first of the
-    angles or rates.
+    """Return the angle (rad) of the swing knee beyond straight, or its rate.
+
+    first  index in y of the first angle, or of the first rate
     """
     return y[first + model.shank] - y[first + model.thigh]
 
@@ -52,8 +53,9 @@ def hip_above_fall(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last solver step may contain an event, judged by values and rates at its ends. It usually contains
-    none.
+    """Whether the last solver step may contain an event, judged by values and rates at its ends.
+
+    Most solver steps contain none, so this saves sampling the event functions.
     """
     model = system.model
     old = method.y_old

@@ -209,7 +209,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
 
 
-def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
+def push_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
     """Return the state y (2 n,) after an impulse (N s) at the hip along the slope, applied just after a heel strike."""
     # The new stance foot stays at rest. The trailing knee is already released and moves freely.
     n = len(model.arm_x)

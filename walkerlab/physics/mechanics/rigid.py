@@ -41,11 +41,11 @@ def rigid_on_level_ground(
     Raises ValueError, with a message for the user, if the parts are not a walker with two legs.
     """
     check_legs(assembly)
-    first = swinging_first(assembly, gravity, knee_locked_at_strike, law)
+    first = build_first_leg_model(assembly, gravity, knee_locked_at_strike, law)
     if have_equal_legs(assembly):
         return first
     exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
-    second = swinging_first(exchanged, gravity, knee_locked_at_strike, law)
+    second = build_first_leg_model(exchanged, gravity, knee_locked_at_strike, law)
     if not knee_locked_at_strike and first.coordinates != second.coordinates:
         raise ValueError(
             "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
@@ -54,7 +54,7 @@ def rigid_on_level_ground(
     return rigid_model.pair(first.changed(leg_length=second.leg_length), second)
 
 
-def swinging_first(
+def build_first_leg_model(
     assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper]
 ) -> RigidModel:
     """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""

@@ -80,9 +80,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     @property
     def exchanged(self) -> "RigidModel":
-        """Model of the next step, in which the legs have exchanged their roles. If the legs are
-        equal, this is the model itself.
-        """
+        """Model of the next step, in which the legs have exchanged their roles: the same model for equal legs."""
         return self if self.paired_with is None else pair(self.paired_with, self)
 
     def __eq__(self, other: object) -> bool:

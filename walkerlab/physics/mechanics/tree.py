@@ -118,8 +118,9 @@ def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
 
 @forced_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
-    """Write sines and cosines (n,) of angles from the slope's normal into s and c. `theta` (n,) is from the
-    vertical.
+    """Write sines and cosines (n,) of the angles from the slope's normal into s and c.
+
+    theta  (n,) the same angles, measured from the vertical
     """
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)

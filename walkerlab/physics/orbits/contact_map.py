@@ -184,8 +184,9 @@ def step_from_section(
     derived: bool = True,
     stance: int = STANCE_FOOT,
 ) -> SectionStep:
-    """Walk from section to section on pads of pitch `pitch_m`. The outcome is REJECTED if a push-off lasts beyond the
-    section.
+    """Walk from section to section on pads of pitch `pitch_m`.
+
+    The outcome is REJECTED if a push-off lasts beyond the section.
     """
     walker = site.walker
     start = state_on_section(walker, z, stance)
@@ -246,7 +247,7 @@ def walk_from_section(
     walker = site.walker
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
-    walk_state = walk_state_on_section(with_footholds(site, heights), start, steps + 1, stance)
+    walk_state = walk_state_on_section(place_footholds(site, heights), start, steps + 1, stance)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
@@ -255,7 +256,7 @@ def walk_from_section(
     if push != 0.0:
         # With room for a single touchdown, the walk stops there, and the push can be applied.
         stopped = go_on(shorten(walk_state, 1), start)
-        pushed = pushed_at_hip(
+        pushed = push_at_hip(
             forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
         )
         stopped = replace(stopped, state=pushed)
@@ -310,14 +311,14 @@ def sample_legs_from_section(
     """
     walker = site.walker
     start = state_on_section(walker, z, stance)
-    walk_state = walk_state_on_section(with_footholds(site, heights), start, heights.size, stance)
+    walk_state = walk_state_on_section(place_footholds(site, heights), start, heights.size, stance)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
     legs = [ANGLES + walker.legs[foot][0] for foot in (stance, 1 - stance)]
     return np.asarray(observer.samples.states[:, legs])
 
 
-def with_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
+def place_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
     # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
     over = np.append(heights[0], heights) - heights[0]
     return replace_terrain(site, site.ground.terrain._replace(heights=over)) if over.any() else site
@@ -329,7 +330,7 @@ def shorten(walk_state: WalkState, steps: int) -> WalkState:
     return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 
-def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
+def push_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
     """Return a state of the free walker just after an impulse (N s) at the hip along the slope."""
     form = system.form
     new = np.array(state)

@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.system import Floats, State
 RANDOM_START = "random start"
 # rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
-# relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+# Relative to the angle between the legs at heel strike. Samples do not resolve smaller angles.
 ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
 # tolerances of steps during the search; gaits are solved with EXACT_STEPS
@@ -63,7 +63,7 @@ class RigidGait:
     step_length: float  # m
     # eigenvalues of the step map's derivative, largest first; empty if the legs differ
     multipliers: tuple[complex, ...]
-    stride_multipliers: tuple[complex, ...]  # the same of a stride
+    stride_multipliers: tuple[complex, ...]  # eigenvalues for a stride
     steps: tuple[tuple[float, float], ...]  # period (s) and length (m) of both steps; leg 1 swings in the first
     residual: float  # rad, largest component of P(x) - x, computed in a separate step, with velocities times sqrt(L/g)
     energy: float  # J, mean over the duration of the step, with heights from the stance foot
@@ -269,8 +269,9 @@ class SlopeBranch:
         self.seed = seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
-        """Follow the gait to `slope` > 0 (rad), and return the slope reached and z (3,), or None if the
-        gait is lost.
+        """Follow the gait to `slope` > 0 (rad), and return the slope reached and z (3,).
+
+        z is None if the gait is lost.
         """
         s = float(np.cbrt(slope))
         # Below the seed's slope, a guess between the limit and the seed is good enough to start there.
@@ -287,8 +288,9 @@ class SlopeBranch:
         return self.start_follower(float(np.cbrt(self.seed.slope)))
 
     def start_follower(self, s: float) -> Follower | None:
-        """Return a follower from the gait at s, or at a smaller s if the seed is too inaccurate, or None if
-        all fail.
+        """Return a follower that starts from the gait at s or, if the seed is too inaccurate there, at a smaller s.
+
+        Returns None if there is no gait at any of them.
         """
         seed = self.seed
         s_seed = float(np.cbrt(self.seed.slope))
@@ -326,8 +328,9 @@ def scale_gait(s: float, z: Floats, period: float) -> Floats:
 
 @lru_cache(maxsize=16)
 def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
-    """Return the branches of the small-slope gaits of a walker on level ground. They are cached, since they serve all
-    slopes.
+    """Return the branches of the small-slope gaits of a walker on level ground.
+
+    They are cached, because searches on all slopes need the same branches.
     """
     looking = map_over_slope(walker, SEARCH_TOLERANCES)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))

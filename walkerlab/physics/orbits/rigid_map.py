@@ -18,11 +18,11 @@ import numpy as np
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.physics.hybrid.rigid_record import Observer, new_observer, unwatched
+from walkerlab.physics.hybrid.rigid_record import Observer, new_observer, new_idle_observer
 from walkerlab.physics.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics import rigid_model as rigid
-from walkerlab.physics.mechanics.impact import pushed_at_hip
+from walkerlab.physics.mechanics.impact import push_at_hip
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import (
@@ -55,10 +55,10 @@ MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # number of solver methods to keep, one for each number of tangent columns
 LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples are taken here, so that none falls after the heel strike
-# in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+# in sqrt(L/g). Standing still is also a fixed point, and any shorter step counts as that.
 SHORTEST_STEP = 0.05
-# Newton's method from random starts
-MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
+# Newton's method from random starts: number of evaluations, and fraction of a move at which it is no longer halved
+MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6
 NO_RESIDUAL = 1e300
 NEAR_RESIDUAL = 1e-6
 # A start within this distance of a known gait leads to that gait if a Newton move with the gait's derivative reduces
@@ -71,8 +71,9 @@ NO_GAIT = -2
 
 
 class StrikeSection(NamedTuple):
-    """Section of states just after heel strike, y = start + z basis. A state includes its variational columns, scaled
-    down.
+    """Section of states just after heel strike, y = start + z basis.
+
+    A state includes its variational columns, which are scaled down.
     """
 
     walker: Any  # records for compiled code, from `models_in_turn`
@@ -199,7 +200,7 @@ class RigidStepper(local):
         self.memory = Memory(
             varied,
             finder,
-            unwatched(),
+            new_idle_observer(),
             np.zeros(size * (1 + d)),
             new_heel_strikes(1, 0, columns=d),
             np.zeros(d, np.int64),
@@ -424,7 +425,7 @@ class SimilarWalker(NamedTuple):
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 
     def swinging(self, swing: int) -> LegSwing:
-        """Return the leg that swings in step number `swing`; see `Stepper.step`."""
+        """Return the leg that swings in step number `swing`, as in `Stepper.step`."""
         return self.swings[swing % len(self.swings)]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
@@ -447,7 +448,7 @@ class SimilarWalker(NamedTuple):
         walker, section, *_ = self.swinging(swing)
         units = self.units
         start = np.array(state_on_section(walker, z))
-        start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
+        start = push_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
         walk = stepper.walk(section, z, heights_m.size - 1, False, self.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
         starts = np.vstack((start, after))[:-1]
@@ -622,7 +623,7 @@ class RigidMap(StepMap):
         walker = unit.swinging(swing).walker
         units = unit.units
         start = state_on_section(walker, z)
-        pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
+        pushed = as_state(push_at_hip(walker, start, push_N_s / units.impulse))
         impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
         walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
         return impulse * units.impulse, walk.min_normal_force * units.force

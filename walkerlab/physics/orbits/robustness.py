@@ -99,8 +99,10 @@ def derivative(function: Callable[[float], Floats | None], step: float) -> Float
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
     """Return norms (indicators,) of e' = C z + D d, z' = A z + B d, or None for an unstable gait.
 
-    A (d, d), B (d,), C (steps of a stride x indicators, d); D (steps, indicators) holds the responses of the first
-    steps.
+    A  (d, d)
+    B  (d,)
+    C  (steps of a stride x indicators, d)
+    D  (steps, indicators) responses of the first steps
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
@@ -203,7 +205,7 @@ class RoughWalks:
     standard_error: float | None  # None if it cannot be estimated
     walks: int
     capped: int  # walks that reached the maximum number of steps
-    # all-failed: mean over all walks; censored: total steps per failure; lower-bound: total steps, no walk failed
+    # all-failed: mean over all walks. censored: total steps per failure. lower-bound: total steps, if no walk failed
     method: Literal["all-failed", "censored", "lower-bound"]
 
 

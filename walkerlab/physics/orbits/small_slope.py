@@ -32,7 +32,7 @@ LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding e
 # rad, angle between the legs at which the long-period seed is accurate to a percent
 LONG_AMPLITUDE = 0.05
 SHORT_AMPLITUDE = 0.002
-# largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
+# largest exponent of growth while falling for half a step. Above it, rounding errors hide the start.
 MAX_GROWTH = 30.0
 # matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
 # state into theta_1 + theta_2
@@ -116,8 +116,9 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """Return the gait at LONG_AMPLITUDE. `per_angle` holds theta_2 + phi, dtheta_1 and dtheta_2 per angle between the
-    legs.
+    """Return the gait at LONG_AMPLITUDE.
+
+    per_angle  (3,) theta_2 + phi, dtheta_1 and dtheta_2, each divided by the angle between the legs
     """
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
@@ -232,7 +233,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
 
 def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
     """Return the smallest root of f in (0, longest) by successively finer samples, or None if f keeps its sign."""
-    # exclude the end, at which the short gait's conditions degenerate into those of the long gait
+    # Exclude the end, at which the conditions of the short gait degenerate into those of the long gait.
     samples = longest * np.arange(1, SCAN) / SCAN
     while True:
         values = f(samples)

@@ -33,8 +33,9 @@ def size(x: Any) -> float:
 
 @kernel_part
 def factor(A: Any, pivots: Any, n: int) -> bool:
-    """Compute LU factors of real or complex A[:n, :n] in place, with row exchanges, and return False if it
-    is singular.
+    """Compute LU factors of real or complex A[:n, :n] in place, with row exchanges.
+
+    Returns False if the matrix is singular.
     """
     # The diagonal holds the pivots' reciprocals.
     for k in range(n):
