@@ -125,8 +125,9 @@ def pack(payload: Any) -> bytes:
 
 
 def read_code(path: Path) -> Any:
-    """Read a kernel's code, or return None if the file is damaged, unreadable or deleted, or needs classes that are
-    gone.
+    """Read the code of a kernel.
+
+    Returns None if the file is damaged, unreadable or deleted, or if it needs classes that are gone.
     """
     try:
         content = path.read_bytes()

@@ -180,7 +180,7 @@ def _refusal(root: Path) -> str:
         make_private_folder(root)
         folder = root.resolve()
         generations = list(folder.glob("kernels-*"))
-        # a folder that holds anything else is not ours alone: others may need it
+        # Others may need a folder that contains anything else, so its permissions must stay as they are.
         if is_own(folder.stat()) and len(generations) == len(list(folder.iterdir())):
             folder.chmod(0o700)
         if may_be_foreign(folder):

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled, impact
 from walkerlab.outcome import Outcome
-from walkerlab.physics.hybrid.recorded_walk import STEPS_AT_ONCE, as_state, are_far_from
+from walkerlab.physics.hybrid.recorded_walk import STEPS_AT_ONCE, are_far_from, as_state
 from walkerlab.physics.hybrid.recorded_walk import take_walk as take_walk_of_model
 from walkerlab.physics.hybrid.rigid_measures import energies as energies_of_model
 from walkerlab.physics.hybrid.rigid_measures import reactions as reactions_of_model

@@ -61,7 +61,7 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
 
     along  (unknowns, n)
 
-    Errors of successive angles may be correlated; only those of different half steps, or legs, count as independent.
+    Errors of successive angles may be correlated. Only those of different half steps, or legs, count as independent.
     This is the sandwich estimator with jackknifed groups (CR3), where it is larger than the covariance of independent
     errors. Without angles over time, all errors are independent.
 
@@ -200,7 +200,7 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
         if not is_open(np.array([value, largest]))[0]:
             continue
         order = np.argsort(-np.abs(direction))
-        # The sign of a singular vector is arbitrary; the largest component is shown as a rise.
+        # The sign of a singular vector is arbitrary. The largest component is shown as a rise.
         signed = direction * np.sign(direction[order[0]])
         moved = (np.abs(direction) * information.scales > errors) & (errors > 0.0)
         parts = [(information.keys[k], float(signed[k])) for k in order if moved[k] or abs(signed[k]) >= LOADED]

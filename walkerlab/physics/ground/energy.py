@@ -13,7 +13,7 @@ from walkerlab.physics.mechanics import tree
 
 @kernel_part
 def kinetic_energy(form: GroundModel, y: Any) -> float:
-    # r is scratch here; only M is used
+    # `add_inertia` also writes to r, which is not used.
     s, c, r, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
     half = forms.half_size(form)
     total = 0.0

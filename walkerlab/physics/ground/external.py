@@ -30,7 +30,7 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
     """Write the motion of both feet into `feet`, and the forces of ground, hinges and push-off into `forces`.
 
-    system  walker in the form that has all bodies; its levers run from the base's point to feet and hip
+    system  walker in the form with all bodies, with levers that run from the point of the base to feet and hip
     chain   (n, links) map from relative to absolute angles; bodies that move as one have equal rows
     q, v    (2 + links) coordinates and velocities of the other program
     feet    (2, 4) along (m), height (m), slip (m/s), rate of the height (m/s)

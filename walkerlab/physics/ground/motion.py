@@ -57,7 +57,8 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     half = forms.half_size(form)
     for k in range(n):
         r[k] = 0.0
-    # About the centre of mass gravity has no torque; `ground_derivative` adds its acceleration.
+    # In a free form, gravity has no torque about the root, which is the centre of mass. `ground_derivative` adds the
+    # acceleration.
     if form.places == 0:
         F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
         tree.projections(form.arm_x, form.arm_y, n, s, c, F, U)

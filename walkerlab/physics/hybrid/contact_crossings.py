@@ -69,7 +69,7 @@ def sample_foot(
     values[first + events.LEFT_EDGE, j] = motion.along - edges[0]
     values[first + events.RIGHT_EDGE, j] = edges[1] - motion.along
     values[first + events.RELEASE, j] = release_function(system.normal, -motion.height, -motion.vertical_velocity)
-    # A law with a single formula has no such penetration. Infinity then spans no zero.
+    # A law with a single formula returns infinity, so this function has no zero.
     values[first + events.FULL_DAMPING, j] = motion.height + switching_penetration(system.normal)
     sample_switching(system.friction, motion.slip, values, first + events.FRICTION_SWITCHES, j)
 
@@ -86,7 +86,7 @@ def earliest_crossing(
         if foot == system.form.pinned:
             continue
         row = foot * events.PER_FOOT
-        # a foot in the air has no force to switch; switching after a touch belongs to the next solver step
+        # A foot in the air has no force that switches, and switching after a touch belongs to the next solver step.
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + events.HEIGHT] < 0
         # The rows of a foot begin with its height and edges; the switching points follow.
         end = row + events.RELEASE

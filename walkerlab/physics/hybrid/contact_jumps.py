@@ -40,7 +40,7 @@ def change_form(
     columns = forms.to_full(before.form, Phi[: y.size], size)
     waits = np.zeros(Phi.shape[1])
     ends_step = event < events.PASSING and event % events.PER_FOOT == events.HEIGHT
-    # The touch has already exchanged the legs' roles; before it, the other leg was the stance leg.
+    # The touch has already exchanged the roles of the legs. Before it, the other leg was the stance leg.
     if ends_step:
         before = before._replace(progress=forms.new_progress(stance=1 - after.progress.stance))
     if events.EXTENSION_RATE <= event < events.PULSE_END:

@@ -32,8 +32,9 @@ MAX_DOUBTFUL_REWINDS = 12
 
 @kernel
 def scan(system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder) -> tuple[float, int]:
-    """Sample all event functions on a solver step into `finder.values`, and return the result of
-    `earliest_crossing`.
+    """Sample all event functions on a solver step into `finder.values`, and find the first event.
+
+    The result is that of `earliest_crossing`.
     """
     for node in range(finder.nodes.size):
         sample_event_functions(system, walk_state, finder.states[node], node, finder)
@@ -59,8 +60,8 @@ def walk_in_form(
     """Walk until the steps fill `walk_state`, the walker changes its form, a pinned step is complete, or the walk ends.
 
     method  the start state on entry, the end state on return
-    until   NO_LIMIT; or a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT:
-            when the walk state is full, walk on until the foot that carried the last step has lifted
+    until   NO_LIMIT, a number of steps, or AT_LIFT. After a number of steps, the walk also ends when the feet pass each
+            other. With AT_LIFT, it continues until the foot that carried the last step has lifted
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
@@ -198,7 +199,8 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_pinned(system)) or (event == events.PASSING and 0 <= until <= walk_state.progress.steps):
         return endings.WALKED
-    # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
+    # The tangent jumps when the form changes, and when forces jump as the legs change roles. Only the caller can apply
+    # such a jump.
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return endings.CHANGES_FORM
     # The force is continuous at its switching points, so the method continues with its history.
@@ -251,8 +253,9 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, walk_state: WalkState, t: float) -> int:
-    """Return the outcome if the flight or the step is too long at t (s), otherwise GOES_ON. This updates
-    `airborne_since`.
+    """Return the outcome if the flight or the step is too long at t (s), otherwise GOES_ON.
+
+    `airborne_since` is updated first.
     """
     # A foot that lifts at t still counts as on the ground, because the event at the solver step's end is applied later.
     grounded = is_pinned(system)

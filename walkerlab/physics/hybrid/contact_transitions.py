@@ -153,7 +153,7 @@ def lift(
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
         walk_state.lifted[foot] = t
-        # The step that this foot carried is over; its slip ends only now.
+        # The step that this foot carried is over, but its slip ends only now.
         if not stands:
             step = walk_state.progress.steps - 1
             walk_state.lift_time[step] = t

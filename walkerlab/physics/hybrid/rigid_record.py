@@ -151,8 +151,9 @@ def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float
 
 @kernel_part
 def vertex(before: float, middle: float, after: float) -> float:
-    """Find the position of the maximum of the parabola through values at -1, 0 and 1, or return 2 if it has
-    no maximum.
+    """Find the position of the maximum of the parabola through values at -1, 0 and 1.
+
+    Returns 2 if the parabola has no maximum.
     """
     bend = before - 2.0 * middle + after
     return 0.5 * (before - after) / bend if bend < 0.0 else 2.0

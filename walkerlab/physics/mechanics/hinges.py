@@ -41,8 +41,9 @@ class HingeTorque(NamedTuple):
 
 @dispatch_by_type_or_default
 def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
-    """Compute the torque of a law at an angle (rad) and rate (rad/s), or zero for instantaneous laws such
-    as IdealLock.
+    """Compute the torque of a law at an angle (rad) and rate (rad/s).
+
+    It is zero for laws that act in an instant, such as IdealLock.
     """
     return HingeTorque(0.0, 0.0, 0.0, 0.0)
 

@@ -186,7 +186,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     n, E = len(model.arm_x), model.E[rigid.STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # the trailing leg carries no other body; its constants about the hip are those with which it swings next
+    # The trailing leg carries no other body. Its constants about the hip are those with which it swings next.
     following = model.exchanged
     leg = [rigid.SWING] if following.shank == rigid.NO_SHANK else [rigid.SWING, int(following.shank)]
     inertia_leg = following.A[np.ix_(leg, leg)].sum()

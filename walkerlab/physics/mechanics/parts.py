@@ -128,9 +128,7 @@ class Assembly:
         return names.index(body)
 
     def hinge(self, body: str, other: str) -> Revolute | None:
-        """Return the hinge between two bodies, with the first as the parent, or None if they are not hinged
-        directly.
-        """
+        """Return the hinge between two bodies, with the first as the parent, or None if there is no such hinge."""
         for joint in self.joints:
             if (joint.parent, joint.child) == (body, other):
                 return joint
@@ -149,8 +147,9 @@ class Tree(NamedTuple):
     arm_y: Floats
 
     def merge_bodies(self, members: Floats) -> dict[str, Any]:
-        """Return the fields of a Mechanism for grouped bodies. `members` (bodies, n) is 1 where a body belongs to a
-        group.
+        """Return the fields of a Mechanism in which each group of bodies is one body.
+
+        members  (bodies, n) 1 where a body belongs to a group, otherwise 0
         """
         A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
         return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
@@ -279,9 +278,7 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
 
 
 def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
-    """Return the point in a body's frame where it is hinged to another, or the origin if they are not
-    hinged directly.
-    """
+    """Return the point in the frame of `body` where it is hinged to `other`, or the origin without such a hinge."""
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 
@@ -289,5 +286,5 @@ def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
 def leg_bodies(assembly: Assembly) -> Integers:
     named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
     most = max(map(len, named))
-    # a leg of fewer bodies repeats its last one
+    # The shorter leg repeats its last body, because both rows must have the same length.
     return np.array([[assembly.index(body) for body in (*leg, *leg[-1:] * (most - len(leg)))] for leg in named])

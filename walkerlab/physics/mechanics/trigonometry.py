@@ -38,7 +38,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
     """Compute (sin x, cos x) of lanes, within 3e-16 for angles up to a few thousand turns."""
-    # If any lane is further than a quarter turn from 0, the nearest multiple k pi is subtracted in every lane; odd k
+    # If any lane is further than a quarter turn from 0, the nearest multiple k pi is subtracted in every lane. Odd k
     # flips the sign, and k = 0 leaves a lane unchanged.
     if any_positive(abs(x) - HALF_PI):
         k = nearest(PER_PI * x)
@@ -51,8 +51,9 @@ def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
 
 @kernel_part
 def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute (sin x, cos x) for |x| up to pi/2 by Chebyshev interpolation in x^2. Truncation errors are
-    below 1e-16.
+    """Compute (sin x, cos x) for |x| up to pi/2 by Chebyshev interpolation in x^2.
+
+    Truncation errors are below 1e-16.
     """
     z = x * x
     w = z * z

@@ -21,7 +21,7 @@ from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, s
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, Integers
 
-# tolerances of walks in a basin; they cause errors of 1e-7 per step
+# tolerances of walks in a basin, which cause errors of 1e-7 per step
 RTOL, ATOL = 1e-6, 1e-8
 CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # tolerances of walks that determine attractors
 SECTION_SIZE = 3
@@ -163,7 +163,7 @@ def stride_of(walker: Walker) -> int:
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """Find the attractors that the unit walker reaches from section coordinates `starts` (n, 3)."""
-    # The first starts walk the full length; later starts do so only if they reach no attractor known by then.
+    # The first starts walk the full length. Later starts do so only if they reach no attractor known by then.
 
     def add_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
@@ -186,7 +186,7 @@ def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple
     points = rough.last[elsewhere]
     # Most walks end on the same few cycles, so walks that end at the same point are continued only once.
     _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
-    # `np.unique` sorts by value; the sorted indices restore the order of the starts.
+    # `np.unique` sorts by value. Sorting the indices restores the order of the starts.
     distinct = points[np.sort(first)][:MAX_SETTLED_WALKS]
     settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=tight)
     cycles: list[Floats] = []

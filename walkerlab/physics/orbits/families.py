@@ -212,8 +212,8 @@ class BranchTracer:
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def check_after(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
-        """Return a test of the next point: multipliers near the unit circle move little, and no shorter gait is
-        reached.
+        """Return a test of the next point: whether multipliers near the unit circle move little, and the gait is not a
+        shorter one.
         """
         # A pair of crossings is missed if multipliers move far. A gait of fewer steps solves the equations too, and a
         # long step may reach it. Its branch meets this one only at a flip, where a multiplier of the cycle is 1.
@@ -239,8 +239,9 @@ class BranchTracer:
     def next_point(
         self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
     ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
-        """Return the next point, step length and, if reached, the end of the branch. If no point follows, return only
-        the end.
+        """Return the next point, the next step length and, if it is reached, the end of the branch.
+
+        Returns only the end if no point follows.
         """
         # A step out of the span is cut at its edge, because there may be no walker beyond.
         ahead = last.x + step * last.tangent
@@ -267,8 +268,9 @@ class BranchTracer:
     def solve_at_edge(
         self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats
     ) -> CurvePoint[Cycle] | None:
-        """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,), or return None if that
-        fails.
+        """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,).
+
+        Returns None if that fails.
         """
         start = equations.value(last.x)
         value = equations.value(beyond)
@@ -353,8 +355,9 @@ class BranchFollower(BranchTracer):
         return branches
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
-        """Return the first gait of twice the period, at the normal form's amplitude, or None if Newton's
-        method fails.
+        """Return the first gait of twice the period, at the amplitude of the normal form or at a fraction of it.
+
+        Returns None if Newton's method finds no such gait.
         """
         # The tangent must point away from the flip, so the halves of the cycle must move apart along it.
         for halving in range(AMPLITUDE_HALVINGS):
@@ -369,7 +372,7 @@ class BranchFollower(BranchTracer):
 
 
 def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float) -> bool:
-    """Whether a gait lies on the segment between two neighbours and its tangent turns by less than arccos(`turn`)."""
+    """Whether a gait lies on a segment of a branch, with a tangent that turns by less than arccos(`turn`)."""
     first = segment.first
     along = float(first.tangent @ (gait.x - first.x))
     if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:

@@ -181,11 +181,12 @@ class FamilySearch:
         return replace(family, attractors=attractors, exponents=measured)
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span.
+        """Return the family with gaits of 2, 4, 8, ... steps beyond flips outside the span, and an attractor.
 
-        Also return the attractor at the smallest value.
+        The attractor is the one at the smallest value, or None if there is none.
         """
-        # A walk from an end of the branch leaves the gait for the attractor; its nearly repeating points are the seeds.
+        # A walk from an end of the branch leaves the gait for the attractor. The points to which it nearly returns are
+        # the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
         ends = [

@@ -109,8 +109,11 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 
 
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
-    """Differentiate a gait's quantities with respect to the parameter, or return nothing if the step map fails at
-    nearby values.
+    """Differentiate the quantities of a gait with respect to the parameter.
+
+    scale  magnitude of significant changes of the parameter
+
+    Returns an empty dictionary if the step map fails at nearby values.
     """
     # A fourth-order quotient errs by h^4 and by rtol / h, which are of the same size at the fifth root of rtol.
     h = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale
@@ -167,8 +170,9 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
 
 
 def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collection[str]) -> Derivatives | None:
-    """Compute difference quotients of step h along the family, or return None if the step map fails at
-    nearby values.
+    """Compute difference quotients of step h along the family, near the direction `guess` (d,).
+
+    Returns None if the step map fails at nearby values.
     """
     along = family_direction(gait, h, guess)
     if along is None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
-from walkerlab.physics.hybrid.rigid_record import Observer, new_observer, new_idle_observer
+from walkerlab.physics.hybrid.rigid_record import Observer, new_idle_observer, new_observer
 from walkerlab.physics.hybrid.rigid_walk import EVENTS, SHORTEST_LANDING, HeelStrikes, new_heel_strikes, take_step, walk
 from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics import rigid_model as rigid
@@ -218,8 +218,8 @@ class RigidStepper(local):
     ) -> Steps:
         """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
-        floor  rises and nearest landing (see HeelStrikes), in units of the walker; even ground by default
-        start  (2 n,) state off the section to walk from instead of z, without a derivative
+        floor  rises and nearest landing, as in `HeelStrikes`, in units of the walker. The default is even ground
+        start  (2 n,) state off the section from which to walk instead of z, without a derivative
         """
         d, size = section.basis.shape
         method, columns = (self.memory.varied, d) if derived else (self.plain, 0)

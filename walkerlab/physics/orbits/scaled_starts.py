@@ -72,8 +72,9 @@ class ScaledStarts:
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
-        """Return the number of steps after which periods and lengths match the gait, or None if the last
-        step does not.
+        """Return the number of steps after which periods and lengths match the gait.
+
+        Returns None if those of the last step do not.
         """
         if self.gait is None:
             return None

@@ -213,8 +213,11 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`, or return None if a walk
-    fails.
+    """Differentiate step quantities (steps,) and samples (times, 2) of a disturbed walk in one direction.
+
+    along  (d + steps + 1,) changes of z and of the heights (m)
+
+    Returns None if a walk fails.
     """
     ends = []
     h = VARIATION / np.abs(along).max()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 SUNDIALS_PACKAGE = "sksundae"
-# CVODE needs an end time to choose its first step; an event ends the walk long before that time
+# CVODE needs an end time to choose its first step. An event ends the walk long before that time.
 FAR_AHEAD = 1e3
 
 

@@ -89,9 +89,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
 
 @kernel_part
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
-    """Compute a step of h (s) from `y_old` into `y`, and return its error relative to the tolerance,
-    equation (10.17).
-    """
+    """Compute a step of h (s) from `y_old` into `y`, and return its error relative to the tolerance by (10.17)."""
     y_old = method.y_old
     y = method.y
     at = method.at
@@ -185,7 +183,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     limit = GROW_MOST
     outcome = stepping.OUT_OF_BUDGET
     while counts[stepping.RHS] < counts[stepping.BUDGET]:
-        # stretch a step that nearly reaches the end, rather than leave a tiny one
+        # Stretch a step that nearly reaches the end, because a tiny one would have to follow.
         last = t + 1.01 * h >= t_end
         if last:
             h = t_end - t

@@ -81,7 +81,8 @@ def sampling(degree: int) -> tuple[Any, Any]:
 def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
     """Find the fraction of the step, above `after`, at which an event function first changes sign, or NO_CROSSING.
 
-    `direction` is FALLING, RISING, or 0 for either; `zero_at_start` divides out a zero at the step's start.
+    direction      FALLING, RISING, or 0 for either
+    zero_at_start  whether the event function is zero at the start of the step; this zero is divided out
     """
     if not spans_zero(finder, event):
         return NO_CROSSING
@@ -211,7 +212,7 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
     for _ in range(100):
         if b - a <= 2.0 * ROOT_RESOLUTION or value_a == value_b:
             break
-        # rounding may put the secant's zero on an end; keep it inside so that the bracket shrinks
+        # Rounding may put the zero of the secant on an end. Keep it inside, so that the bracket shrinks.
         c = min(max((a * value_b - b * value_a) / (value_b - value_a), a + ROOT_RESOLUTION), b - ROOT_RESOLUTION)
         value_c = evaluate(stack, piece, size, c)
         if value_c == 0.0:

@@ -37,8 +37,9 @@ def unknowns(J: Any) -> int:
 
 @kernel_part
 def factor_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any) -> bool:
-    """Factor the reduced matrix for shift s into `factors` (size, size), real or complex, or return False if it is
-    singular.
+    """Factor the reduced matrix for shift s, real or complex, into `factors` (size, size).
+
+    Returns False if the matrix is singular.
     """
     n = J.shape[0]
     inverse = reciprocal(s)

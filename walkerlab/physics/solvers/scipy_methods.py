@@ -1,6 +1,6 @@
 """Integrators of SciPy and SUNDIALS with the interface of `stepping`, for comparison and as a check.
 
-The right-hand side is compiled; the walk itself runs in Python from the same source.
+The right-hand side is compiled, but the walk itself runs in Python, from the same source.
 """
 
 from collections.abc import Callable
@@ -123,7 +123,7 @@ def step_solver(method: ScipyMethod) -> int:
     if method.solver is None:
         return stepping.OUT_OF_BUDGET
     try:
-        # a trial step may overflow; the library then takes a shorter one
+        # A trial step may overflow. The library then takes a shorter one.
         with np.errstate(over="ignore", invalid="ignore"):
             method.solver.step()
         if method.solver.status == "failed":
