@@ -79,7 +79,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         vectorize = numba.config.LOOP_VECTORIZE
         numba.config.LOOP_VECTORIZE = 0
         try:
-            # Only compiling needs the lock; stored code can be loaded by any number of processes.
+            # Only compiling needs the lock. Any number of processes can load stored code.
             with lock_of(name) if next(files_of(name), None) is None else contextlib.nullcontext():
                 return super().compile(sig)
         finally:
@@ -90,7 +90,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         name = self.file_name(signature)
         for path in files_of(name):
             payload = read_code(path)
-            # a class defined in a notebook is a different class in the next process
+            # A class defined in a notebook is a different class in the next process.
             if payload is not None and payload[SIGNATURE].args == tuple(signature):
                 files_in_use.add(name)
                 # As in numba's own cache: code can be rebuilt only in an initialised context.

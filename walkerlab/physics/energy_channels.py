@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-# entries of the account (J, up to the present time); TORQUE is the work of the hip torque, a part of HIP_WORK, and
+# entries of the account (J, up to the present time). TORQUE is the work of the hip torque, a part of HIP_WORK, and
 # FORWARD is the positive work of that torque
 DAMPING_LOSS, FRICTION_LOSS, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP_WORK, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1

@@ -1,8 +1,9 @@
 """Files of machine code: those that the package's build compiled, and the user's cache.
 
-The cache has a folder for each state of the sources, version of numba and processor; its name contains a digest of all
-sources that kernels can use, so stale code never runs. The package's own files are used only if they were compiled from
-the present sources, with the present numba, and for a processor like this one.
+The cache has a folder for each state of the sources, version of numba and processor. A digest of all sources that
+kernels can use is part of the folder's name, so stale code never runs. The files of the package are used only if they
+were compiled from the present sources, with the present numba, and for a processor like this one.
+
 Compiled code is loaded only from the package, and from folders and files that no other user may have written.
 """
 
@@ -77,7 +78,7 @@ def sources_digest() -> str:
 
 def processor_features() -> set[str]:
     """Return LLVM's names of the features that compiled code may use on this processor."""
-    # imported here and below so that checking whether the folder is writable loads no compiler
+    # Imported here and below, so that checking whether the folder is writable loads no compiler.
     import numba
     from numba.core.codegen import get_host_cpu_features
 
@@ -247,7 +248,7 @@ def _remove_unused(generations: list[Path]) -> None:
 
 def lock_of(name: str) -> Any:
     """Create an interprocess lock, a file in the folder of compiled code."""
-    # imported here because a process that finds everything compiled needs no lock
+    # Imported here, because a process that finds everything compiled needs no lock.
     from filelock import FileLock
 
     return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock", mode=0o600)

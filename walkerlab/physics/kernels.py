@@ -44,7 +44,7 @@ def forced_inline(function: F) -> F:
 
 def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
     """Let compiled calls of `function` use a body chosen from the argument types. Each body is compiled once."""
-    # `body_for` receives numba's types of the arguments, and returns the body and its compiler flags
+    # `body_for` receives numba's types of the arguments, and returns the body and the compiler flags for it.
     parts: dict[Any, Any] = {}
     compiled: dict[Any, Any] = {}
 
@@ -108,7 +108,7 @@ class ByType:
         body = self._bodies.get(chosen, self.default)
         if body is None:
             name = chosen.__name__ if hasattr(chosen, "_fields") else label
-            # numba passes on errors unchanged unless they are of its own classes
+            # Numba changes errors only if they are of numba's classes, so the user sees this one unchanged.
             raise TypeError(f"{self.__name__} has no case for {name}: register one with @{self.__name__}.case(...)")
         return body
 
@@ -132,7 +132,7 @@ class LawKind(NamedTuple):
     """Force laws that a config key can select."""
 
     key: str  # last part of the key
-    laws: dict[str, Any]  # built-in classes by word
+    laws: dict[str, Any]  # classes of the built-in laws, by name in a config
     protocol: type
     required: tuple[ByType, ...]  # functions of which each law needs a case
     together: tuple[ByType, ...] = ()  # functions of which a law needs either all cases or none
@@ -153,7 +153,7 @@ class ByAddress(types.Type):
 
 
 def pass_by_reference(chosen: C) -> C:
-    """Let kernels pass a NamedTuple class by address. Python creates its values, kernels only read their fields."""
+    """Let kernels pass a NamedTuple class by address. Only Python creates its values, kernels just read their fields."""
     # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
     # packing and unpacking them.
 
@@ -192,7 +192,7 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 def vector(like: Any) -> Any:
     """Allocate scratch memory (n,) for the calling function, where n is the length of `like`, a tuple or an array."""
-    # filled with NaN in Python, so that reading an entry before writing it shows up
+    # In Python it is filled with NaN, so that reading an entry before writing it shows up.
     return np.full(len(like), np.nan)
 
 

@@ -68,7 +68,7 @@ def test_velocities_of_a_stretched_copy_differ_by_the_stretch():
     assert_allclose(in_phase.largest("velocity"), (1 - 1 / 1.01) * np.abs(walk().velocity).max(axis=0), rtol=1e-2)
 
 
-def test_difference_in_time_grows_from_step_to_step():
+def test_difference_at_equal_times_grows_from_step_to_step():
     time, difference = difference_in_time(walk(period=1.01 * PERIOD), walk())
     each = [np.abs(difference.angle[(time > k * PERIOD) & (time < (k + 1) * PERIOD)]).max() for k in range(STEPS)]
     assert (np.diff(each) > 0).all()
@@ -146,7 +146,7 @@ def test_orbit_distance_between_circles_is_relative_to_the_range():
     assert_allclose(orbit_distances(circle(1.1), circle(1.0)), 0.1 / 2.0, rtol=1e-3)
 
 
-def test_distance_of_dense_polylines_equals_that_of_their_points():
+def test_distance_of_polylines_equals_that_of_points_sampled_densely_on_them():
     rng = np.random.default_rng(3)
     for _ in range(5):
         one, other = (np.cumsum(rng.normal(size=(12, 2)), axis=0) for _ in range(2))

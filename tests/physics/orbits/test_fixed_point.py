@@ -294,7 +294,7 @@ def test_degenerate_walkers_are_searched_without_errors(changes):
         assert gait.residual <= 1e-11
 
 
-def test_slope_with_only_unstable_gaits_says_so():
+def test_search_reports_that_a_slope_has_only_unstable_gaits():
     search = find_gaits(on_slope(5.0))
     assert not search.gait.stable
     assert "no gait is stable" in search.reason

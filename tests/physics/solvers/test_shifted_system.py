@@ -50,7 +50,7 @@ def test_systems_from_equations_of_motion_are_solved_with_half_as_many_unknowns(
     [np.zeros((3, 3)), np.array([[0.0, 2.0], [1.0, 0.0]]), np.array([[1e-9, 1.0], [1.0, 0.0]]), np.ones((1, 1))],
     ids=["odd", "scaled velocity", "not quite", "one equation"],
 )
-def test_general_systems_are_solved_with_all_their_unknowns(J):
+def test_systems_that_cannot_be_halved_keep_all_their_unknowns(J):
     assert unknowns(J) == J.shape[0]
 
 

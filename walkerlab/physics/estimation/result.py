@@ -150,7 +150,7 @@ class Identification:
     measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
     leg_differences: tuple[LegDifference, ...] = ()  # one for each estimated key of leg 2
     first_leg: FirstLeg | None = None  # None for equal legs
-    # differences if the other leg swings first; empty if the data decide which leg does
+    # differences if the other leg swings first. Empty if the data decide which leg does
     other_differences: tuple[LegDifference, ...] = ()
 
     @property

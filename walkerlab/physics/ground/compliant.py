@@ -132,7 +132,7 @@ def fill(form: Any, assembly: parts.Assembly, root: Root, locked: list[int], mer
         form[name] = value
     merged = root.tree.merge_bodies(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
     form["mass"] = merged.pop("mass")
-    # A form has room for MAX_BODIES; its constants fill the first entries of each axis.
+    # A form has room for MAX_BODIES bodies. The constants fill the first entries of each axis.
     for name, value in (merged | {"E": parts.reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]

@@ -78,6 +78,6 @@ def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float,
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
     force = forms.foot_force(system, motion)
-    # damping takes (F_n - k d^e) d', where d' is the rate of the penetration d
+    # Damping takes (F_n - k d^e) d', where d' is the rate of the penetration d.
     damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
     return damping, -force.along * motion.slip, force.normal.force

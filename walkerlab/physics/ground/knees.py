@@ -40,7 +40,7 @@ def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
 @hinge_torque.case(Impact)
 def stop_torque(law: Impact, angle: float, rate: float) -> HingeTorque:
     """Compute the torque of a compliant stop, which pushes a knee back when it extends beyond straight."""
-    # a stop's law is in rad and N m instead of m and N
+    # The law of a stop is in rad and N m instead of m and N.
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
     torque = normal_force(law, angle, rate)

@@ -50,7 +50,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
     Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
     """
-    # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a pinned form, of gravity
+    # At first r is the sum of torques: of feet, hinges, stops, centrifugal forces and, in a pinned form, gravity.
     form = system.form
     forms.sines_cosines(form, y, s, c)
     n = form.bodies
@@ -105,7 +105,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
     moves = j >= half
     k = (j - half if moves else j) - p
     if k < 0:
-        # j is a coordinate or velocity of the root, normal to the slope (-1) or along it (-2)
+        # j is a coordinate or velocity of the root, normal to the slope (k = -1) or along it (k = -2).
         if k == -1:
             return (0.0, -1.0, 0.0) if moves else (-1.0, 0.0, 0.0)
         return 0.0, 0.0, 1.0 if moves else 0.0

@@ -58,7 +58,7 @@ class NormalForce(NamedTuple):
 def normal_force(law: Any, penetration: float, penetration_rate: float) -> NormalForce:
     """Compute the normal force of a law, which is never adhesive.
 
-    Penetration d (m) and its rate d' (m/s) are positive into the ground; the caller skips feet with d <= 0.
+    Penetration d (m) and its rate d' (m/s) are positive into the ground. Do not call it for feet with d <= 0.
     """
 
 

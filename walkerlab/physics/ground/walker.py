@@ -175,7 +175,7 @@ def place_on_ground(
     progress: WalkProgress | None = None,
 ) -> OnGround:
     """Return the walker in the form for its knees, by default on foot 1. `level` (2,) is the ground height (m)."""
-    # arrays of fixed types, because kernels would be compiled again for others
+    # Convert to arrays of fixed types, because kernels would be compiled again for others.
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(pinned), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -265,7 +265,7 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 
 def to_form(form: GroundModel, x: Any) -> Floats:
     """Convert a full state (of all bodies), or variational columns, to the state of a form with the same root."""
-    # Merged bodies have equal angles and rates up to rounding; those of the first are used.
+    # Merged bodies have equal angles and rates up to rounding. Use those of the first.
     p = int(form.places)
     half = len(x) // 2
     first = form.first[: form.bodies]

@@ -88,7 +88,7 @@ def earliest_crossing(
         row = foot * events.PER_FOOT
         # A foot in the air has no force that switches, and switching after a touch belongs to the next solver step.
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + events.HEIGHT] < 0
-        # The rows of a foot begin with its height and edges; the switching points follow.
+        # The rows of a foot begin with its height and edges. The switching points follow.
         end = row + events.RELEASE
         if inside and ground.frame.locate_switching and not progress.passes_switching:
             end = row + events.FRICTION_SWITCHES + switching_count(system.friction)

@@ -228,7 +228,7 @@ def walk_contact(
 ) -> ContactWalkResult:
     """Walk up to `steps` steps, the first on foot `stance`, which is pinned during that step if `pinned`.
 
-    start     state (4 + 2 n) of the free walker; a pinned step uses only its angles and angular velocities
+    start     (4 + 2 n) state of the free walker, of which a pinned step uses only angles and angular velocities
     sampling  sampling interval (s), rising sample times (samples,) in s, or None for no samples
 
     A start whose hip is already too low is rejected.

@@ -160,7 +160,7 @@ class Recorder:
         self.grid_index = 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, rigid_walk.EVENTS, len(walker.zero_state))
-        # walks with a library's method run in Python
+        # Walks with a method of another library run in Python.
         self.walk: Callable[..., tuple[int, int]] = (
             rigid_walk.walk if tolerances.compiled else uncompiled(rigid_walk.walk)
         )

@@ -58,7 +58,7 @@ class Observer(NamedTuple):
     # last heel strike.
     states: Any
     steps: Any  # (samples,) index of the step in which each sample lies
-    # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
+    # () array of RIGID_TALLY, because passing a structured scalar to a kernel takes as long as a solver step
     tally: Any
 
 

@@ -1,7 +1,7 @@
 """Torques at hinges, for both models, from the angle between two bodies and its rate.
 
-A law is a type registered with `hinge_torque` and `hinge_energy`. Its resistance turns the first body back and the
-second one forward; it dissipates the power (resistance - elastic part) times the rate.
+A law is a type registered with `hinge_torque` and `hinge_energy`. The resistance of a law turns the first body back and
+the second one forward. The law dissipates the power (resistance - elastic part) times the rate.
 
 Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of its law, a
 SpringDamper or a law derived from it. The first row is the hip; the others are the knees that can bend: the swing knee

@@ -27,7 +27,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
 
     At a heel strike, AT_STRIKE, the swing foot becomes the stance foot and the legs exchange their roles: `before` is
     the model of the swing that ends, `model` that of the next one. Any number of variational columns may follow the
-    state; they are also mapped and written into `new`.
+    state. They are also mapped and written into `new`.
     """
     # E[phase] makes bodies follow others, such as a locked shank its thigh (see tree.py).
     like = model.arm_x
@@ -136,7 +136,7 @@ def lock(
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
         project(tree, constraints, rates, along=0.0, upward=0.0, twist=0.0, turned=turned, p=changes)
-    # p is a projection in the metric M, so p^T M (omega - p) = 0 and the loss has this form.
+    # As p is a projection in the metric M, p^T M (omega - p) = 0, and the loss has this form.
     return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 
@@ -166,7 +166,7 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     y_l = s_l * model.hip_x + c_l * model.hip_y + R_l
     length = math.hypot(x_t, y_t)
     share = model.push_off / length
-    # The impulse passes through the hip; this is its moment about the leading leg's contact point.
+    # The impulse passes through the hip. This is the moment about the contact point of the leading leg.
     angular = share * (x_l * y_t - y_l * x_t)
     # Turning a leg moves the hip about the arc's centre, which is R above the contact point: dx = -(y - R), dy = x.
     # With R > 0 the length of the trailing line also changes.

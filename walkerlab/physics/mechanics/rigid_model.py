@@ -182,7 +182,10 @@ def state_or_column(system: Mode) -> Any:
 
 @forced_inline
 def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any, r: Any) -> None:
-    """Write M' (n, n) in kg m^2 into M, r' (n,) in N m into r, and their terms into s, c, F and U."""
+    """Write M' (n, n) in kg m^2 into M and r' (n,) in N m into r.
+
+    Sines and cosines of the angles go to s and c, and the projected first moments to F and U, (n,) each.
+    """
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
     tree.sines_cosines(model, n, y, s, c)

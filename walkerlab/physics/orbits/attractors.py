@@ -1,7 +1,7 @@
 """Attractors of a step map over a parameter, and their largest Lyapunov exponents.
 
 The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector. Its uncertainty, at least
-1/steps, is the standard error of means over blocks of several correlation times; walks with few blocks are continued.
+1/steps, is the standard error of means over blocks of several correlation times. Walks with few blocks are continued.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """

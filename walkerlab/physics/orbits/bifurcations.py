@@ -21,7 +21,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
 BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
-# difference step for the normal form; coordinates are of magnitude one
+# difference step for the normal form, for coordinates of magnitude one
 NORMAL_FORM_STEP = 1e-3
 FORM_REFINEMENTS = 4
 FIRST_MULTIPLIER_DROP = 0.2  # 1 minus the multiplier at the first point of a new branch

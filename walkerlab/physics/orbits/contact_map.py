@@ -1,6 +1,6 @@
 """Step map of the contact model, on a section where no foot is touching down or lifting off.
 
-On the section the swing foot passes the stance foot; the fast transients of touchdown have decayed by then. The
+On the section the swing foot passes the stance foot. By then the fast transients of touchdown have decayed. The
 coordinates, ordered by the legs' roles, are the height of the centre of mass, the angles of the bodies except the swing
 leg's uppermost one (which the section determines), the velocity along and normal to the slope, and the rates of all
 bodies that turn independently: six for two straight legs. The stance knee is locked, the swing knee free.
@@ -172,7 +172,7 @@ def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats
 
 
 def stance_of(swing: int) -> int:
-    """Return the stance foot of a step, counted from 0. In step 0 leg 1 swings."""
+    """Return the stance foot of step number `swing`. Steps are counted from 0, and leg 1 swings in step 0."""
     return STANCE_FOOT if swing % 2 == 0 else 1 - STANCE_FOOT
 
 

@@ -196,7 +196,7 @@ class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an erro
 
 def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
     """Return the point of a segment where `measure` changes sign, by Brent's method, or None if the curve is lost."""
-    # imported late, because only curves need it
+    # Imported here, because only curves need it.
     from scipy.optimize import brentq
 
     points: dict[float, CurvePoint[Data]] = {0.0: segment.first, segment.length: segment.second}

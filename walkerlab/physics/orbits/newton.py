@@ -89,5 +89,5 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
         corrections = corrections + 1
     if current.outcome is Outcome.WALKED:
         return Solution(x, current, corrections)
-    # if only a later move led to parameters without a valid walker, the guess itself has one
+    # If only a later move led to parameters without a valid walker, the guess itself is valid.
     return NotConverged(Outcome.WALKED if current.outcome is None and corrections else current.outcome)

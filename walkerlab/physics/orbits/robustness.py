@@ -71,7 +71,10 @@ class GaitOnMap(NamedTuple):
         return walk_steps(self.step_map, z, p, self.step_map.stride, derived, self.swing)
 
     def split_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait from the start of each step of its stride, in the order of `leg`: once for equal legs."""
+        """Return the gait from the start of each step of its stride, in the order of `leg`.
+
+        For equal legs, a stride is a single step.
+        """
         if self.step_map.stride == 1:
             return [self]
         first, second = (step for step in self.stride(self.z, self.p).steps)

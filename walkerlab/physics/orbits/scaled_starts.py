@@ -135,7 +135,7 @@ def margins(
     around   factors on the velocities of swing and stance leg that lead to walking
     largest  largest factor tried
     """
-    # Factors are `step` apart until one fails; then the last interval is bisected.
+    # Factors are `step` apart until one fails. Then the last interval is bisected.
     results = []
     for name, *direction in SCALING_DIRECTIONS:
         sign = 1.0 if max(direction) > 0.0 else -1.0

@@ -201,7 +201,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     strike[0, 0] = 1.0
     for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
         strike[1:, 2 + leg] = apply_strike(flat, leg_state(flat, (0.0, 0.0), omega))[n : n + 2]
-    # equilibrium: a leg with a rolling foot balances off the vertical on a slope of one radian
+    # The equilibrium is not zero, because a leg with a rolling foot balances off the vertical on a slope.
     legs = leg_columns(flat)
     pull = np.array([0.0, flat.mass * flat.gravity * flat.radius])
     equilibrium = np.zeros((4, 4))

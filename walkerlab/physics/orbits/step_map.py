@@ -1,6 +1,6 @@
 """Step map of a walker from section to section, as a function of one parameter, and its gaits, for either model.
 
-`rigid_map.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
+`rigid_map.RigidMap` is the rigid model, `contact_map.ContactMap` a walker on compliant ground. A period-n gait is a
 fixed point of n steps, `walk_steps`, whose derivative is the product of the steps' derivatives.
 """
 
@@ -121,7 +121,7 @@ class StepMap(Stepper, Protocol):
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
-        # A foot stands in compliant ground at a depth that depends on the parameters; at another depth it would bounce.
+        # A foot stands in compliant ground at a depth that depends on the parameters. At another depth it would bounce.
         return z
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:

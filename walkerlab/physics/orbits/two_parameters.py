@@ -26,7 +26,7 @@ from walkerlab.physics.orbits.newton import Effort, Equations, Evaluated, NotCon
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.system import Floats, Integers
 
-# finite-difference step for the test function; unknowns are of magnitude one
+# difference step for the test function, for unknowns of magnitude one
 DIFFERENCE_STEP = 1e-5
 CURVE_CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
 CACHED_MAPS = 256  # maps cached, one for each value of the second parameter
@@ -34,7 +34,7 @@ PLANE_CELLS = (72, 36)
 ALL_FAILED = -1  # period of a cell in which every walk fails
 TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # number of steps that are dropped, and of steps that are examined
 CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # accuracy of a cell's gait
-# offset from an unstable gait; coordinates are of magnitude one
+# offset from an unstable gait, for coordinates of magnitude one
 UNSTABLE_OFFSET = 1e-3
 
 

@@ -35,7 +35,7 @@ class CvodeSolver:
     ) -> None:
         from sksundae.cvode import CVODE
 
-        # copies, because CVODE's arrays must not be written to
+        # Pass copies, because CVODE's arrays must not be written to.
         def rate(t: float, y: Any, dy: Any) -> None:
             dy[:] = fun(t, np.array(y))
 
@@ -52,7 +52,7 @@ class CvodeSolver:
 
     def step(self) -> None:
         if self.interpolated:
-            # after interpolation CVODE must first return to the end of its step
+            # After interpolation, CVODE must first return to the end of the step.
             self.solver.step(self.t, "normal", None)
             self.interpolated = False
         ahead = self.solver.step(self.t + FAR_AHEAD, "onestep", None)

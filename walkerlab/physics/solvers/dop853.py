@@ -192,13 +192,13 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
             counts[stepping.ACCEPTED] += 1
             growth = limit if error == 0.0 else min(limit, change_of_step(error))
             clock[stepping.T_OLD], clock[stepping.T] = t, t_end if last else t + h
-            # a step shortened by t_end says little about the next one
+            # A step shortened by t_end says little about the next one.
             clock[stepping.H_NEXT] = max(clock[stepping.H_NEXT], h * growth) if last else h * growth
             return stepping.STEP_DONE
         counts[stepping.REJECTED] += 1
         # As in Hairer's code, the step does not grow right after a rejection.
         limit = 1.0
-        # the error may be infinite or not a number
+        # The error may be infinite or not a number.
         h *= change_of_step(error) if error < 1e300 else 0.1
         clock[stepping.H_NEXT] = h
         if h <= stepping.SMALLEST_STEP * max(abs(t), 1.0):

@@ -229,7 +229,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     rate = method.control[RATE]
     for iteration in range(1, MAX_NEWTON + 1):
         size = newton_move(method, system, t, h)
-        # also true for NaN
+        # The comparison is also true for NaN.
         if not size < 1e100:
             return 0
         if iteration > 1:

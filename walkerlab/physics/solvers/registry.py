@@ -24,7 +24,7 @@ class Method:
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
     """Return a factory for methods that use a class of scipy.integrate, with or without the Jacobian."""
-    # scipy is imported on first use
+    # SciPy is imported on first use.
 
     def new_solver(*problem: Any, **options: Any) -> Any:
         from scipy import integrate
@@ -85,7 +85,7 @@ class Tolerances:
     rtol: float
     atol: float
     budget: int  # right-hand sides per walk
-    # whether the energy balance of a contact walk is checked; comparisons of methods skip the check
+    # whether to check the energy balance of a contact walk, which comparisons of methods do not need
     track_energy: bool = True
 
     @property

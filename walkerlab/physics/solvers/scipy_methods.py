@@ -128,7 +128,7 @@ def step_solver(method: ScipyMethod) -> int:
             method.solver.step()
         if method.solver.status == "failed":
             return stepping.STEP_TOO_SMALL
-        # dense output may evaluate the right-hand side and exhaust the budget
+        # Creating the dense output may evaluate the right-hand side and exhaust the budget.
         method.dense = method.solver.dense_output()
     except OutOfBudgetError:
         return stepping.OUT_OF_BUDGET

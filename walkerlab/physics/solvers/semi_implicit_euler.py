@@ -1,6 +1,6 @@
 """Semi-implicit Euler with a fixed step, as in game engines: new velocities first, then positions from them.
 
-First order, without error estimate or events; used only for comparison.
+It is of first order, without error estimate or events, and serves only for comparison.
 """
 
 import math
@@ -30,7 +30,7 @@ def semi_implicit_euler(system: Any, y: Any, rate: Any, end: float, h: float, ma
         for i in range(half):
             y[i] += span * y[half + i]
         for i in range(y.size):
-            # also true for NaN
+            # The comparison is also true for NaN.
             if not abs(y[i]) < DIVERGED:
                 return step + 1
     return min(steps, max_steps)
