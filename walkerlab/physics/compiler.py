@@ -150,7 +150,7 @@ def strip_bitcode(path: Path) -> bytes:
 
 def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
     """Yield the classes that fields of a record type name as "module/class"."""
-    # NumPy's records cannot be read by others if a field's name has a colon.
+    # The separator is no colon, because other libraries cannot read NumPy's records if the name of a field has one.
     for module, slash, name in (field.partition("/") for field in fields):
         if slash:
             yield getattr(importlib.import_module(module), name)
@@ -167,7 +167,7 @@ def classes_in(kind: Any) -> Iterator[type]:
 
 
 def outside_sources(function: Callable[..., Any], classes: list[type]) -> Iterator[tuple[str, bytes]]:
-    """Yield names and texts of code that a kernel uses outside the sources of kernels: a user's law, an extension."""
+    """Yield names and texts of code that a kernel uses from outside this package, such as a user's law."""
     functions = [function, *(body for chosen in classes for body in bodies.get(chosen, ()))]
     outside = {each.__module__ for each in (*functions, *classes)}
     outside = {name for name in outside if not name.startswith(f"{PACKAGE}.physics.")}

@@ -40,7 +40,7 @@ TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "linux-aarch64": ("generic", ("neon",)),
     "darwin-arm64": ("apple-m1", ()),
 }
-# the only packages that may hold compiled functions; a test checks this
+# the only packages that may contain compiled functions, which a test checks
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 # A file may register a body with `.case(` without importing `kernels`.
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
@@ -101,7 +101,7 @@ def build_target() -> tuple[str, tuple[str, ...]] | None:
 
 
 def circumstances() -> dict[str, str]:
-    """Return the values, found on this machine, on which the package's machine code depends."""
+    """Return the properties of this installation on which the package's machine code depends."""
     import llvmlite
     import numba
 

@@ -153,7 +153,7 @@ class ByAddress(types.Type):
 
 
 def pass_by_reference(chosen: C) -> C:
-    """Let kernels pass a NamedTuple class by address. Only Python creates its values, kernels just read their fields."""
+    """Let kernels pass a NamedTuple class by address. Python creates the values, and kernels only read their fields."""
     # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
     # packing and unpacking them.
 

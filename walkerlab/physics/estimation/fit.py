@@ -48,7 +48,7 @@ EVALUATIONS: Final = 12  # maximum number of evaluations per round
 FIT_TOLERANCE: Final = 1e-6
 SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
-# standard deviation of a weak prior on each scaled unknown; it keeps undetermined combinations near the start
+# standard deviation of a weak prior on each scaled unknown, which keeps undetermined combinations near the start
 WEAK_PRIOR: Final = 1.0
 # efficiency of the soft_l1 loss for normal noise: E[psi']^2 / E[psi^2] with psi(x) = x / sqrt(1 + x^2)
 SOFT_EFFICIENCY: Final = 0.9268

@@ -143,7 +143,7 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
 
 
 def likely_noises(fitted: Fitted) -> Noise:
-    """Return the likeliest noises (sets,) without disturbances, with each alone and with both, stacked."""
+    """Return the likeliest noise for each set of disturbances (none, one kind, both kinds), stacked in one `Noise`."""
     problem = fitted.problem
     noises, _ = zip(
         *noise_by_disturbances(fitted.rows, problem.floors, problem.leg_length_m, fitted.noise), strict=True

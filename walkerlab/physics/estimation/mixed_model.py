@@ -267,7 +267,7 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
 def noise_by_disturbances(
     rows: Reduced, floors: Floats, leg_length_m: float, start: Noise
 ) -> Iterator[tuple[Noise, float]]:
-    """Yield the likeliest noise without disturbances, with each alone and with both, and its restricted likelihood.
+    """Yield the likeliest noise, and its likelihood, without disturbances, with each kind of them and with both kinds.
 
     Each search starts from the likeliest of several noises.
     """

@@ -1,6 +1,6 @@
 """Walker on compliant ground: a tree of bodies with ball feet.
 
-Its form depends on which knees are locked and whether a foot is pinned.
+The form of the walker depends on which knees are locked and on whether a foot is pinned.
 
 The state is (along, height, theta_1 .. theta_n) and their rates: the position (m) of the centre of mass along the slope
 (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an ideal lock holds a

@@ -144,7 +144,7 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
 def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
     """Return the state of each knee (2,) at the start: locked in the stance leg, released or bent in the swing leg.
 
-    A straight swing leg whose foot is not on the ground is in the part of its swing after its knee has locked.
+    If the swing leg is straight and its foot is not on the ground, its knee has already locked in this swing.
     """
     knee = np.full(2, RELEASED, np.int8)
     swing = 1 - stance

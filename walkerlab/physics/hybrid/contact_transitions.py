@@ -96,7 +96,7 @@ def set_level(
 ) -> None:
     """Change the ground under a foot to `level` (m). The energy in the ground's spring is lost.
 
-    height  of the foot above its present ground (m)
+    height  m, height of the foot above its present ground
     """
     if level == walk_state.level[foot]:
         return

@@ -206,7 +206,7 @@ def observe(
         after = record_extremes(tally, mode, y)
         mean_energy += SIMPSON[eighth] * tally.energy
         for measure in range(3):
-            # The parabola through the last three samples has its maximum between them.
+            # Refine if the parabola through the last three samples has its maximum between them.
             if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
                 refine_maximum(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before = middle

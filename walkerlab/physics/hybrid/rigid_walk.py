@@ -126,7 +126,10 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 
 @kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Find the fractions of a solver step of heel strike (foot ahead), fall and knee strike, or NO_CROSSING."""
+    """Find the fractions of a solver step at which heel strike (foot ahead), fall and knee strike occur.
+
+    The fraction of an event that does not occur is NO_CROSSING.
+    """
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
@@ -240,8 +243,9 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
     """Apply the strike at the end of a phase, after a last Newton correction of its time, and return that time (s).
 
     Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` how much later each
-    tangent column strikes (its wait). A heel strike turns a column Phi into J (Phi + f wait), to stay on the section; a
-    knee strike turns it into J (Phi + f wait) - f+ wait. f, f+: rates before and after; J: derivative of the jump.
+    tangent column strikes (its wait). At a heel strike, a column Phi becomes J (Phi + f wait), which stays on the
+    section. At a knee strike, it becomes J (Phi + f wait) - f+ wait. Here f and f+ are the rates before and after the
+    strike, and J is the derivative of the jump.
     """
     model = system.model
     y = method.y
@@ -290,7 +294,7 @@ class HeelStrikes(NamedTuple):
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before the strikes
     after: Any  # (steps, m) states just after the strikes, with the legs' roles exchanged
-    # (steps,) s, times of the knee strikes; input: negative if a knee is locked from the start; empty without knees
+    # (steps,) s, times of the knee strikes; empty without knees. A negative input means a knee locked from the start
     knee_time: Any
     rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present foothold
     nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground

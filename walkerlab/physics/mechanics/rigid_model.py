@@ -37,7 +37,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
     roles: Integers  # (n,) body k after a heel strike is body roles[k] before it
-    section: Integers  # (n + 1,) state indices of the section's d coordinates, the stance leg's angle first; then zeros
+    section: Integers  # (n + 1,) state indices of the d section coordinates, from the stance leg's angle on; then zeros
     coordinates: int  # [d] number of coordinates on the section
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees
@@ -422,7 +422,7 @@ def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Compute the sum (rad) of the straight legs' angles from the slope's normal, zero if both feet are on even ground.
 
     For legs that are alike, the sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays
-    or lanes, measured from the vertical; (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from
+    or lanes, measured from the vertical. (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from
     the normal.
     """
     return swing + stance + 2.0 * (model.slope + model.lean)

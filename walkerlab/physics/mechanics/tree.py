@@ -9,16 +9,14 @@ with psi the angles from the normal, and let Delta = theta_l - theta_k. Then
 where the two terms of gravity hold for a root at rest. Each model adds the terms due to its root's motion: those of a
 rolling foot in rigid_model.py, Newton's law for the centre of mass in ground/motion.py.
 
-In the functions, `tree` is a Mechanism with n bodies: a `RigidModel`, or a `GroundModel` on compliant ground. The
-compiler knows n if the tree's type fixes it.
+In the functions, `tree` is a Mechanism with n bodies: a `RigidModel`, or a `GroundModel` on compliant ground. If the
+type of the tree fixes n, the compiler unrolls the loops below, which then take little more than half the time.
 
-Some bodies follow others: a locked shank follows its thigh, a torso the bisector of the legs.
-
-If the angles are theta = E z with a constant E, then M alpha = r becomes E^T M E dz = E^T r, where dz holds the
-accelerations of z. The system keeps its size: a follower's row and column are added to those of the bodies that it
-follows, and its own equation becomes trivial. A follower's row of E (n, n) holds its weights, with zero on the
-diagonal; all other rows are those of the unit matrix. A model has an E for each phase. If the model's type fixes n, the
-compiler unrolls the loops below, which then take little more than half the time.
+Some bodies follow others: a locked shank follows its thigh, a torso follows the bisector of the legs. So the angles are
+theta = E z with a constant E, and M alpha = r becomes E^T M E dz = E^T r, where dz holds the accelerations of z. The
+system keeps its size: the row and column of a follower are added to those of the bodies that it follows, and the
+follower's own equation becomes trivial. The row of a follower in E (n, n) holds its weights, with zero on the diagonal.
+All other rows are those of the unit matrix. A model has an E for each phase.
 """
 
 from collections.abc import Mapping

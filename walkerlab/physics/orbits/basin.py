@@ -243,7 +243,7 @@ def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generat
 
 @dataclass(frozen=True)
 class Window:
-    """Grid of starts over some of the section coordinates, SI units."""
+    """Grid of starts over some of the section coordinates, in SI units."""
 
     axes: tuple[int, ...]  # indices into (theta_2, dtheta_1, dtheta_2)
     lower: tuple[float, ...]  # lower bound along each axis

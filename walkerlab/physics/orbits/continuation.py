@@ -28,7 +28,7 @@ from walkerlab.physics.orbits.newton import (
 from walkerlab.physics.solvers.system import Floats
 
 FEW_CORRECTIONS = 3  # the next step is longer if no more Newton corrections than this were needed
-ROOT_RESOLUTION = 1e-14  # absolute, in arclength
+ROOT_RESOLUTION = 1e-14  # accuracy of a root, in arclength
 # (abscissa, solution) pairs, latest last
 Points = tuple[tuple[float, Floats], ...]
 
@@ -191,7 +191,7 @@ class Segment(Generic[Data]):
 
 
 class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an error)
-    """The corrector found no point between two neighbours."""
+    """Raised if the corrector finds no point between two neighbours."""
 
 
 def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:

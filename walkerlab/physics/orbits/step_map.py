@@ -97,7 +97,7 @@ class Stepper(Protocol):
 
 
 class StepMap(Stepper, Protocol):
-    """Step of a walker from section to section, with what continuation needs besides: derivatives and limits."""
+    """Step of a walker from section to section, with the derivatives and limits that continuation needs."""
 
     names: tuple[str, ...]  # names of the section coordinates, which are all of magnitude one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures

@@ -82,7 +82,7 @@ def first_crossing(finder: CrossingFinder, event: int, direction: int, after: fl
     """Find the fraction of the step, above `after`, at which an event function first changes sign, or NO_CROSSING.
 
     direction      FALLING, RISING, or 0 for either
-    zero_at_start  whether the event function is zero at the start of the step; this zero is divided out
+    zero_at_start  whether the event function is zero at the start of the step, where it then counts as no crossing
     """
     if not spans_zero(finder, event):
         return NO_CROSSING

@@ -15,7 +15,7 @@ from walkerlab.physics.solvers.scipy_methods import DENSE_DEGREE, ScipyMethod
 @dataclass(frozen=True)
 class Method:
     name: str  # name in configs
-    # factory: (number of equations, rtol, atol, budget of right-hand sides)
+    # factory, called with the number of equations, rtol, atol and the budget of right-hand sides
     new: Callable[[int, float, float, int], Any]
     stiff: bool  # whether the method suits stiff problems
     orders: tuple[int, int]  # minimum and maximum order; equal unless the method varies its order
