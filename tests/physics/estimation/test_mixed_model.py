@@ -14,7 +14,7 @@ from walkerlab.physics.estimation.mixed_model import (
     most_probable_disturbances,
     noise_at,
     reduce,
-    restricted_with_slope,
+    restricted_likelihood_and_slope,
     whitening,
 )
 
@@ -58,7 +58,7 @@ def test_likelihood_equals_a_multivariate_normal_density(data):
 def test_likelihood_gradient_equals_its_difference_quotient(data, kicks):
     rows, logs = reduce(replace(data, kicks=kicks)), np.log([0.3, 0.5, 0.2, 0.1])
     noise = noise_at(logs, (0, 1))
-    likelihood, slope = restricted_with_slope(rows, noise)
+    likelihood, slope = restricted_likelihood_and_slope(rows, noise)
     assert likelihood == pytest.approx(float(evaluate(rows, noise).restricted), rel=1e-12)
     for place, unit in enumerate(np.eye(4)):
         ends = [float(evaluate(rows, noise_at(logs + sign * 1e-5 * unit, (0, 1))).restricted) for sign in (1, -1)]

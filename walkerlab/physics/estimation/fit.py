@@ -183,7 +183,7 @@ def fit(
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
             noise = average_noise(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation = evaluate(rows, noise)
-        robust = robust_at(rows, noise)
+        robust = robust_scatter(rows, noise)
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
         heights = reduce_heights(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
@@ -224,7 +224,7 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     Returns None if a walk ends early.
     """
     problem = like.problem
-    data = linearise(problem, u, like.disturbances, robust=robust_at(like.rows, like.noise))
+    data = linearise(problem, u, like.disturbances, robust=robust_scatter(like.rows, like.noise))
     predicted = problem.forecast.predict(u, np.zeros(like.forecast.heights))
     if data is None or predicted is None:
         return None
@@ -323,7 +323,7 @@ class Robust(NamedTuple):
     absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
 
 
-def robust_at(rows: Reduced, noise: Noise) -> Robust:
+def robust_scatter(rows: Reduced, noise: Noise) -> Robust:
     spread = noise.spread(rows.G.shape[1], rows.kicks)
     unknowns = rows.unknowns
     disturbed = spread > 0.0

@@ -48,12 +48,12 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
         average = average_covariance(fitted, likely_noises(fitted), basis)
         root = np.linalg.cholesky(basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T)
         inverse = np.linalg.inv(root)
-        return replace(result, **in_units(widen(basis.T @ root, inverse @ average @ inverse.T), scales))
+        return replace(result, **scale_covariance(widen(basis.T @ root, inverse @ average @ inverse.T), scales))
     determined = np.eye(fitted.u.size)
     determined[: len(keys), : len(keys)] = basis.T @ basis
     covariance = robust_covariance(fitted, determined)[: len(keys), : len(keys)]
     freedom = min(result.freedom, float(max(1, groups.max() + 1 - fitted.u.size)))
-    return replace(result, freedom=freedom, **in_units(covariance, scales))
+    return replace(result, freedom=freedom, **scale_covariance(covariance, scales))
 
 
 def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
@@ -93,8 +93,8 @@ def widen(root: Floats, meat: Floats) -> Floats:
     return np.asarray(root @ root.T)
 
 
-def in_units(covariance: Floats, scales: Floats) -> dict[str, Any]:
-    """Return the covariance and the correlations of the parameters from the covariance of the scaled parameters."""
+def scale_covariance(covariance: Floats, scales: Floats) -> dict[str, Any]:
+    """Return the covariance of the parameters from that of the scaled parameters, and the correlations."""
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return {"covariance": covariance * np.outer(scales, scales), "correlations": covariance / np.outer(errors, errors)}
 
@@ -109,7 +109,9 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     basis = directions[~is_open(singular)]
     covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
     freedom = float(max(1, values - len(whole)))
-    return Information(keys, singular, directions, scales=scales, freedom=freedom, **in_units(covariance, scales))
+    return Information(
+        keys, singular, directions, scales=scales, freedom=freedom, **scale_covariance(covariance, scales)
+    )
 
 
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
@@ -121,12 +123,12 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
     if not len(basis):
         return information.freedom
     likeliest = basis @ (information.covariance / np.outer(information.scales, information.scales)) @ basis.T
-    ratio = float(np.trace(np.linalg.solve(likeliest, averaged_covariance(fitted, basis)))) / len(basis)
+    ratio = float(np.trace(np.linalg.solve(likeliest, average_over_plausible_noise(fitted, basis)))) / len(basis)
     # ratio = nu / (nu - 2), solved for nu
     return min(information.freedom, 2.0 * ratio / (ratio - 1.0)) if ratio > 1.0 else information.freedom
 
 
-def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
+def average_over_plausible_noise(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
     # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     noise = fitted.noise

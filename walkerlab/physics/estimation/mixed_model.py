@@ -187,7 +187,7 @@ def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
     return density + alone * relative[..., 0], alone - centred / (rows.sizes.size * NOISE_RATIO**2)
 
 
-def restricted_with_slope(rows: Reduced, noise: Noise) -> tuple[float, Floats]:
+def restricted_likelihood_and_slope(rows: Reduced, noise: Noise) -> tuple[float, Floats]:
     """Return the restricted log-likelihood of one noise level, and its slope (quantities + 2,).
 
     The slope is with respect to the logarithms of the standard deviations.
@@ -305,7 +305,7 @@ def climb(
     free = [*range(rows.sizes.size), *(rows.sizes.size + source for source in sources)]
 
     def costs(logs: Floats) -> tuple[float, Floats]:
-        restricted, slope = restricted_with_slope(rows, noise_at(logs, sources, leg_length_m))
+        restricted, slope = restricted_likelihood_and_slope(rows, noise_at(logs, sources, leg_length_m))
         return -restricted, -slope[free]
 
     likelihoods = evaluate(rows, noise_at(np.array(starts), sources, leg_length_m)).restricted

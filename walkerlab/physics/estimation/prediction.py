@@ -186,9 +186,9 @@ class Forecast(Readings):
         return tuple((u[: self.scales.size] * self.scales).tolist())
 
     def start(self, u: Floats) -> Floats:
-        return self.walks.rest_on_ground(self._unsettled(u), self.parameters(u))
+        return self.walks.rest_on_ground(self._start_before_settling(u), self.parameters(u))
 
-    def _unsettled(self, u: Floats) -> Floats:
+    def _start_before_settling(self, u: Floats) -> Floats:
         first = self.scales.size
         return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
@@ -273,7 +273,9 @@ class Forecast(Readings):
         z = self.start(u)
         starts = self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
-        settling = differentiate_settling(self.walks, self._unsettled(u), self.parameters(u), self.directions)
+        settling = differentiate_settling(
+            self.walks, self._start_before_settling(u), self.parameters(u), self.directions
+        )
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
         kicked = self.kicked and lifts.size > 0
         varied = self.walks.differentiate_walk(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)

@@ -68,7 +68,7 @@ def contact_walker(
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
     forms["has_knee"] = [k < len(assembly.knees) for k in range(2)]
-    for pinned, root in enumerate((about_centre(assembly), about_foot(assembly, pinned_foot))):
+    for pinned, root in enumerate((root_at_centre(assembly), root_at_foot(assembly, pinned_foot))):
         for locked in range(4):
             # Bit k of a form's index says that knee k is locked, as in `locked_knees`.
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
@@ -91,13 +91,13 @@ def check_walkable(assembly: parts.Assembly) -> None:
         raise ValueError(f"a walker has at most two knees; this assembly has {len(assembly.knees)}")
 
 
-def about_centre(assembly: parts.Assembly) -> Root:
+def root_at_centre(assembly: parts.Assembly) -> Root:
     about, feet = parts.tree_about_centre(assembly)
     hip = parts.hip_levers(assembly, feet[0])
     return Root(about, {"places": 2, "pinned": NO_FOOT}, levers_by_axis(feet, hip))
 
 
-def about_foot(assembly: parts.Assembly, foot: int) -> Root:
+def root_at_foot(assembly: parts.Assembly, foot: int) -> Root:
     ball = assembly.feet[foot]
     about = parts.tree_about(assembly, parts.Anchor(ball.body, ball.centre_m))
     _, from_centre = parts.tree_about_centre(assembly)

@@ -93,7 +93,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as read-only: kernels would be compiled again for a writable record."""
-        return restored, (np.asarray(self), self.paired_with)
+        return restore_model, (np.asarray(self), self.paired_with)
 
     def changed(self, **fields: Any) -> "RigidModel":
         """Return a read-only copy with some fields changed. If the legs differ, both models are changed."""
@@ -120,7 +120,7 @@ def pair(first: RigidModel, second: RigidModel) -> RigidModel:
     return model
 
 
-def restored(record: Any, paired_with: RigidModel | None) -> RigidModel:
+def restore_model(record: Any, paired_with: RigidModel | None) -> RigidModel:
     """Return the model of a pickled record."""
     model = replace_fields(record, {})
     return model if paired_with is None else pair(model, paired_with)
@@ -218,7 +218,7 @@ def torque_at(model: RigidModel, row: int, y: Any) -> hinges.HingeTorque:
 
 
 @hinges.legs_apart.case(Mode)
-def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
+def rigid_legs_apart(system: Mode, y: Any) -> tuple[float, float]:
     """Return the angle between the legs' uppermost bodies (rad), and its rate (rad/s)."""
     n = len(system.model.arm_x)
     return y[SWING] - y[STANCE], y[n + SWING] - y[n + STANCE]

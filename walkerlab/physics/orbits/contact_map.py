@@ -249,13 +249,13 @@ def walk_from_section(
     steps = heights.size - 1
     walk_state = walk_state_on_section(place_footholds(site, heights), start, steps + 1, stance)
 
-    def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
+    def continue_walk(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
         # With room for a single touchdown, the walk stops there, and the push can be applied.
-        stopped = go_on(shorten(walk_state, 1), start)
+        stopped = continue_walk(shorten(walk_state, 1), start)
         pushed = push_at_hip(
             forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
         )
@@ -265,16 +265,16 @@ def walk_from_section(
     # If the soles differ, angles do not follow from the footholds. So the walk stops at each touchdown to read them.
     for touches in range(2, steps + 1) if differ else ():
         if stopped.outcome is Outcome.WALKED:
-            stopped = go_on(shorten(walk_state, touches), stopped.state)
+            stopped = continue_walk(shorten(walk_state, touches), stopped.state)
             landed.append(stopped.state[ANGLES + walker.legs[int(walk_state.progress.stance)][0]])
     if stopped.outcome is Outcome.WALKED:
-        stopped = go_on(walk_state, stopped.state, steps)
+        stopped = continue_walk(walk_state, stopped.state, steps)
     if stopped.outcome is Outcome.WALKED:
         stance = int(walk_state.progress.stance)
         z = coordinates_of(walker, np.array(stopped.state), stance)
         # Heights on the section are measured from the ground of the stance foot.
         z[0] -= walk_state.level[stance]
-        stopped = go_on(walk_state, stopped.state)
+        stopped = continue_walk(walk_state, stopped.state)
         landed.append(stopped.state[ANGLES + walker.legs[int(walk_state.progress.stance)][0]])
     touched = int(walk_state.progress.steps)
     times = walk_state.touch_time[:touched]

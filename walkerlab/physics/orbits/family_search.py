@@ -155,7 +155,7 @@ class FamilySearch:
             begin = max(span.least, flip - BEFORE_FLIP * span.size)
             end = span.most
         else:
-            family, first = self.doubled_outside(family)
+            family, first = self.add_doubled_gaits(family)
             if first is None:
                 return family
             start = first.last
@@ -180,7 +180,7 @@ class FamilySearch:
         measured = tuple(exponent for exponent in exponents if exponent is not None)
         return replace(family, attractors=attractors, exponents=measured)
 
-    def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
+    def add_doubled_gaits(self, family: Family) -> tuple[Family, Attractor | None]:
         """Return the family with gaits of 2, 4, 8, ... steps beyond flips outside the span, and an attractor.
 
         The attractor is the one at the smallest value, or None if there is none.

@@ -424,8 +424,8 @@ class SimilarWalker(NamedTuple):
     radius: float
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 
-    def swinging(self, swing: int) -> LegSwing:
-        """Return the leg that swings in step number `swing`, as in `Stepper.step`."""
+    def leg_swing(self, swing: int) -> LegSwing:
+        """Return the swing of step number `swing`, as in `Stepper.step`."""
         return self.swings[swing % len(self.swings)]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
@@ -445,7 +445,7 @@ class SimilarWalker(NamedTuple):
         self, stepper: RigidStepper, z: Floats, heights_m: Floats, push_N_s: float, swing: int
     ) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
-        walker, section, *_ = self.swinging(swing)
+        walker, section, *_ = self.leg_swing(swing)
         units = self.units
         start = np.array(state_on_section(walker, z))
         start = push_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
@@ -469,7 +469,7 @@ class SimilarWalker(NamedTuple):
         starts = np.vstack((state_on_section(self.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
         # No kicks at the start, because changes of the start are columns of `along`, and none after the last step.
-        kicks = [unit_kicks(*self.swinging(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
+        kicks = [unit_kicks(*self.leg_swing(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
@@ -480,7 +480,7 @@ class SimilarWalker(NamedTuple):
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
         for step, start in enumerate(starts[:-1]):
-            walker, section, *_ = self.swinging(step)
+            walker, section, *_ = self.leg_swing(step)
             room = LAST_SAMPLE * (touches[step + 1] - touches[step])
             times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
             tangents = stepper.differentiate(section, start, (rises[step : step + 2], nearest), times)
@@ -556,7 +556,7 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return failed_step(None, z.size)
-        leg = unit.swinging(swing)
+        leg = unit.leg_swing(swing)
         section = leg.section
         step = self._exact.walk(section, z, derived=derived)
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
@@ -620,7 +620,7 @@ class RigidMap(StepMap):
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
         unit = valid(self._unit_at(p))
-        walker = unit.swinging(swing).walker
+        walker = unit.leg_swing(swing).walker
         units = unit.units
         start = state_on_section(walker, z)
         pushed = as_state(push_at_hip(walker, start, push_N_s / units.impulse))
