@@ -39,7 +39,7 @@ LIKELIHOOD_TOLERANCE: Final = 1e-2
 # largest change of a converged unknown, in standard errors
 MOVE_TOLERANCE: Final = 0.1
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
-# smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
+# smallest noise, as a fraction of a quantity's typical size. Noise-free measurements count as this noisy
 NOISE_FLOOR: Final = 1e-6
 NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)

@@ -28,8 +28,8 @@ PHASE_BINS: Final = 20
 # fraction of the leg length. The floor of a laboratory has about 0.001.
 UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
-# largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
-# it
+# Largest acceptable scatter of averaged residuals, as a normal deviate. It is exceeded by 0.8 % of the walks that the
+# model explains.
 MAX_DEPENDENCE: Final = 2.4
 
 

@@ -1,6 +1,6 @@
 """Linear model of a disturbed walk: whitening, restricted likelihood of its standard deviations, and information.
 
-The floor's heights, and kicks that change the rates at heel strikes, disturb the walk; noise disturbs its measurement.
+The floor's heights, and kicks that change the rates at heel strikes, disturb the walk. Noise disturbs its measurement.
 The values of each quantity are first reduced to as many rows as there are derivatives, so the cost of a likelihood does
 not depend on the number of samples.
 """

@@ -10,7 +10,7 @@ from walkerlab.physics.mechanics import hinges
 
 @kernel_part
 def hip_sign(system: OnGround, row: int) -> float:
-    """Return -1 for the hip while the first leg is the stance leg, otherwise 1."""
+    """Return the sign of the angle at a hinge: -1 at the hip while the first leg is the stance leg, otherwise 1."""
     return -1.0 if row == hinges.HIP_ROW and system.progress.stance == 0 else 1.0
 
 

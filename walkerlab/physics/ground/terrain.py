@@ -1,7 +1,7 @@
 """Ground under each foot: lanes of pads, a plane that scuffing feet pass through, or an ordinary plane.
 
 Straight legs scuff, so the paper's walker needs a checkerboard, in a planar model a lane of raised pads for each leg.
-A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell; it suffices for feet
+A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell, and suffices for feet
 that clear the ground.
 """
 

@@ -36,7 +36,7 @@ RELEASED, BENT, STOPPING, LOCKED = range(4)
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     """Constants (SI) of the walker in one form, free or pinned, with certain knees locked: a structured scalar."""
 
-    # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
+    # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers. Only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
     # thigh, with equal indices while they are merged into one body, or if the leg has no knee and is always locked). E
     # holds a single reduction.

@@ -37,7 +37,7 @@ from walkerlab.physics.solvers.system import Floats, State
 EXPECTED_STEP = 3.0  # pendulum times; most steps are shorter
 # Limit for the residual of the energy balance, divided by rtol times (energy + work exchanged). In random walks this is
 # at most 0.5 with radau5 for rtol from 1e-2 to 1e-9 (scripts/contact_campaign.py prints it), and at most 9 with the
-# libraries' multistep methods. In the stability catalogue it is at most 9; the worst case is ground of 1e14 N/m.
+# libraries' multistep methods. In the stability catalogue it is at most 9, for ground of 1e14 N/m.
 RESIDUAL_FACTOR = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
 # rtol below which rounding, not the tolerance, determines the residual

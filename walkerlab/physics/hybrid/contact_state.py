@@ -22,7 +22,7 @@ from walkerlab.physics.solvers.system import State
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 FRICTION_SWITCHES = 5  # first of up to four switching points of the friction law
-MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), not an event; rate of HEIGHT (m/s)
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), which is no event, and rate of HEIGHT (m/s)
 PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)

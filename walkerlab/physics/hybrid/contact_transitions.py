@@ -19,10 +19,10 @@ from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, is
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 
-STEP_AHEAD = 0.25  # fraction of the pitch; a touch less than this ahead of the other foot ends no step
+STEP_AHEAD = 0.25  # a touch that is less than this fraction of the pitch ahead of the other foot ends no step
 # m; a foot this close to the surface is on it, within the error of an event's time
 AT_SURFACE = 1e-11
-TRIP = 0.25  # fraction of the pitch; a foot that touches its old pad this far from where it stood has tripped
+TRIP = 0.25  # a foot that touches its old pad this fraction of the pitch from where it stood has tripped
 
 
 @kernel_part

@@ -21,8 +21,8 @@ from walkerlab.physics.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
-# fraction of a swing's first solver step at which the search for a knee strike starts; before 1e-9, rounding makes a
-# straight knee at rest cross zero
+# The search for a knee strike starts at this fraction of a swing's first solver step. Before 1e-9, rounding makes a
+# straight knee at rest cross zero.
 SEARCH_START = 1e-6
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)

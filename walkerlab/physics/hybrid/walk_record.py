@@ -51,7 +51,7 @@ class DrivenWork(NamedTuple):
 
     def cost_of_transport(self, distance: float) -> float:
         """Compute the work spent divided by weight times distance (m) along the slope."""
-        # A spring returns the energy it stores; work against gravity is already part of the drives' work.
+        # A spring returns the energy it stores, and work against gravity is already part of the drives' work.
         return (max(0.0, self.gravity) + self.push_off + self.hip_torque_positive) / (self.weight * distance)
 
 

@@ -50,7 +50,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     sines_cosines(before, n, y, s, c)
     projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
     # Velocity of the new stance foot's centre, along the slope and normal to it. The old foot's centre moves at -R
-    # omega; at a heel strike the levers to the other foot are added.
+    # omega. At a heel strike the levers to the other foot are added.
     along = -R_before * y[n + rigid.STANCE]
     upward = 0.0
     if other_foot:

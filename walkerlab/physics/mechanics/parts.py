@@ -232,7 +232,7 @@ def tree_about(assembly: Assembly, root: Anchor) -> Tree:
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:
     """Compute the constants about the centre of mass, and the levers (bodies, 2) in m from there to each foot."""
-    # Any point serves as the first root; the levers are then shifted to the centre of mass.
+    # Any point serves as the first root, because the levers are then shifted to the centre of mass.
     root = Anchor(assembly.bodies[0].name, assembly.bodies[0].centre_m)
     mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
     centre = sum(mass * d for mass, d in mass_levers) / total_mass(assembly)

@@ -157,7 +157,7 @@ def check_legs(assembly: parts.Assembly) -> None:
     if not first or not second:
         raise ValueError("both legs need bodies, listed from the hip down: legs: [[…], […]]")
     if len(first) < len(second):
-        raise ValueError("of two legs of which one has a knee, the leg with the knee is listed first")
+        raise ValueError("if only one leg has a knee, that leg must be listed first")
     if len(first) > 2:
         raise ValueError("a leg has at most a thigh and a shank, with one knee between them")
     if set(first) & set(second):

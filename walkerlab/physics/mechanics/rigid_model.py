@@ -1,7 +1,7 @@
 """Rigid model: a walker on one foot, which is pinned to the ground or rolls on it without slip.
 
-The root of the tree is the centre of the foot's arc. It moves along the slope by -R times the stance leg's angle; R = 0
-is a hinge. With M, r, F and U of tree.py, Kronecker's delta d and the index s of the stance leg:
+The root of the tree is the centre of the foot's arc. It moves along the slope by -R times the stance leg's angle. For
+R = 0 it is a hinge. With M, r, F and U of tree.py, Kronecker's delta d and the index s of the stance leg:
 
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
     r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)

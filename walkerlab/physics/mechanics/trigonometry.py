@@ -8,7 +8,7 @@ from walkerlab.physics.solvers.lanes import Lanes, any_positive, fused, holds_la
 QUARTER_PI = 0.7853981633974483
 PER_PI = 0.3183098861837907
 HALF_PI = 1.5707963267948966
-# pi as a sum of two parts; the first has 33 bits, so its products with integers of up to 20 bits are exact
+# pi as a sum of two parts. The first has 33 bits, so its products with integers of up to 20 bits are exact.
 PI_1 = 3.1415926534682512
 PI_2 = 1.2154201012607932e-10
 

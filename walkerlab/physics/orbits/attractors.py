@@ -30,8 +30,8 @@ MAX_BLOCKS = 64  # blocks per walk
 MIN_BLOCKS = 10
 BLOCK_LENGTH = 5.0  # in correlation times
 MAX_WALKS = 8  # maximum number of walks per exponent
-# largest difference between the means of a walk's halves, in standard errors of the whole walk's mean; the standard
-# error of the difference is twice as large
+# Largest difference between the means of a walk's halves, in standard errors of the whole walk's mean. The standard
+# error of the difference is twice as large.
 MAX_DRIFT = 4.0
 SUBSTEPS = 8
 LOSS_HALVINGS = 6

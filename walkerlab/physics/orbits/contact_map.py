@@ -36,8 +36,8 @@ from walkerlab.physics.orbits.step_map import Cycle, DisturbedWalk, MappedStep, 
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-# indices of the position along the slope, the height and the first body's angle in the state; velocities follow in the
-# same order
+# Indices of the position along the slope, the height and the first body's angle in the state. Velocities follow in the
+# same order.
 ALONG = 0
 HEIGHT = 1
 ANGLES = 2

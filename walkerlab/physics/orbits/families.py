@@ -37,7 +37,7 @@ CLOSED_LOOP = "returns to its first point"
 NO_WALKER = "the parameter's next value gives no valid walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # values closer than this to an edge, relative to the size of the span, count as on it
-# maximum number of points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
+# maximum number of points per branch, and growth of a disturbance over a cycle beyond which gaits cannot be resolved
 MAX_BRANCH_POINTS = 400
 MAX_CYCLE_GROWTH = 1e4
 

@@ -31,21 +31,21 @@ SMALLEST_ANGLE = 1e-5
 # Relative to the angle between the legs at heel strike. Samples do not resolve smaller angles.
 ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
-# tolerances of steps during the search; gaits are solved with EXACT_STEPS
+# tolerances of steps during the search. The gaits themselves are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
-# target residual, and largest residual of an acceptable gait; rounding errors are larger on steep slopes
+# target residual, and largest residual of an acceptable gait, because rounding errors are larger on steep slopes
 SOLVED_RESIDUAL = 1e-14
 MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
-# relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+# Relative residual. It cannot be small, because a multiplier tends to 1 as the slope vanishes.
 FOLLOWING_TOLERANCE = 1e-6
-# largest relative distance from the prediction; beyond it the gait belongs to another branch
+# largest relative distance from the prediction. Beyond it, the gait belongs to another branch
 MAX_STATE_JUMP = 0.05
 MAX_PERIOD_JUMP = 0.02
-# halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+# Halvings of the seed's amplitude. The error of the seed shrinks with the square of the amplitude.
 MAX_RETREATS = 5
 # random starts: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank
 # whose knee was free at heel strike
@@ -230,10 +230,7 @@ def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = Sea
     return search.result()
 
 
-NO_DESCENT = (
-    "every heel strike takes energy, and on a slope that does not descend nothing gives it back; "
-    "standing still is no gait"
-)
+NO_DESCENT = "every heel strike takes energy, and only a slope that descends gives it back; standing still is no gait"
 NO_SEED_TEXT = {
     True: "small-slope theory yields no starting gait for this walker",
     False: "without its drive this walker has no gait to follow to this slope",

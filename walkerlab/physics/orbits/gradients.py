@@ -21,7 +21,7 @@ from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
 from walkerlab.physics.orbits.step_map import Cycle, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 
-# Differentiable quantities with units. The norms describe how the step period responds to a floor drop; the scaled norm
+# Differentiable quantities with units. The norms describe how the step period responds to a floor drop. The scaled norm
 # is in the walker's pendulum times per leg length.
 GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "period_s": "s",

@@ -1,7 +1,7 @@
 """Starts with scaled velocities: how far the velocities may change, and the smallest change that leads to walking.
 
 In the paper both velocities were raised by hand until the contact model walked. In this module a start is a pair of
-factors (s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
+factors (s_1, s_2) on the velocities of swing and stance leg, and (1, 1) is the unchanged rigid start.
 """
 
 from __future__ import annotations

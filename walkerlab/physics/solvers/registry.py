@@ -18,8 +18,8 @@ class Method:
     # factory, called with the number of equations, rtol, atol and the budget of right-hand sides
     new: Callable[[int, float, float, int], Any]
     stiff: bool  # whether the method suits stiff problems
-    orders: tuple[int, int]  # minimum and maximum order; equal unless the method varies its order
-    compiled: bool = False  # whether whole walks are compiled; with the method of another library they run in Python
+    orders: tuple[int, int]  # minimum and maximum order, which are equal unless the method varies its order
+    compiled: bool = False  # whether whole walks are compiled. Those with a method of another library run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
