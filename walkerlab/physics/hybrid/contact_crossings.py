@@ -114,7 +114,7 @@ def earliest_crossing(
 def earlier_event(
     first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int
 ) -> tuple[float, int]:
-    """Return the fraction of the solver step and number of an event: `event` if it is earlier, otherwise `first`."""
+    """Return the earlier one of `first` and `event`, as a fraction of the solver step and the number of the event."""
     fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
     return (fraction, event) if fraction < first[0] else first
 

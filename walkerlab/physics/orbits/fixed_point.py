@@ -511,7 +511,7 @@ class Search:
 
 
 def preference(gait: RigidGait) -> tuple[bool, int, float]:
-    """Return a sort key, smallest for the gait to walk: stable, fewest swings, then fastest decay of disturbances."""
+    """Return a sort key that prefers stable gaits, then the fewest swings, then the fastest decay of disturbances."""
     # With several swings in a step, the foot passes through the ground several times, which the model ignores.
     return not gait.stable, gait.swings, gait.spectral_radius
 

@@ -285,7 +285,7 @@ class RigidStepper(local):
         z = np.array([z for z, _ in gaits]).reshape(-1, d)
         DP = np.array([DP for _, DP in gaits]).reshape(-1, d, d)
         results = np.zeros(len(starts), np.int64)
-        # At a fold, I - DP is singular.
+        # Take the pseudo-inverse, because I - DP is singular at a fold.
         solve_from_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, results)
         return results
 
