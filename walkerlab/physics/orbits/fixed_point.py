@@ -230,7 +230,9 @@ def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = Sea
     return search.result()
 
 
-NO_DESCENT = "every heel strike takes energy, and only a slope that descends gives it back; standing still is no gait"
+NO_DESCENT = (
+    "every heel strike takes energy, and a slope that does not descend gives none back; standing still is no gait"
+)
 NO_SEED_TEXT = {
     True: "small-slope theory yields no starting gait for this walker",
     False: "without its drive this walker has no gait to follow to this slope",
