@@ -154,7 +154,10 @@ def likely_noises(fitted: Fitted) -> Noise:
 
 
 def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:
-    """Average the covariance along directions `basis` (directions, parameters) over noises (n,), by likelihood."""
+    """Average the covariance along directions `basis` over noises (n,), weighted by their likelihoods.
+
+    basis  (directions, parameters)
+    """
     count = basis.shape[1]
     drawn = evaluate(fitted.rows, noises)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)

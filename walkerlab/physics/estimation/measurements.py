@@ -45,7 +45,10 @@ class MeasuredWalk:
 
 
 def split_into_steps(time_s: Floats, angles_rad: Floats, touches_s: Floats, touch_sum_rad: float = 0.0) -> MeasuredWalk:
-    """Assign samples of angles (samples, 2) to steps between heel strikes (steps + 1,), dropping samples outside."""
+    """Assign samples of angles (samples, 2) to the steps between heel strikes (steps + 1,).
+
+    Samples before the first and after the last heel strike are dropped.
+    """
     inside = (time_s >= touches_s[0]) & (time_s < touches_s[-1])
     periods = np.diff(touches_s)
     time = time_s[inside]

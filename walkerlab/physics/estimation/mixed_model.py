@@ -225,11 +225,12 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return information, step to the most likely unknowns, sum of squares there, and the information's determinant.
+    """Return the information, the step to the most likely unknowns, the sum of squares there, and a log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
-    The determinant is returned as its logarithm, over those eigenvalues that exceed rounding errors.
+    The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
+    errors.
     """
     information = reduced[..., 1:, 1:]
     score = reduced[..., 1:, 0]
@@ -327,7 +328,7 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 
 
 def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
-    """Return a function that whitens values (values,), or columns (values, n), of a walk with this noise.
+    """Return a function that whitens values (values,) of a walk with this noise, or columns (values, n) of values.
 
     Values with the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, become independent and
     of unit variance.

@@ -55,7 +55,10 @@ class WalkMap(Protocol):
         """Return z (d,) with the stance foot at rest on the ground."""
 
     def sample_legs(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
-        """Return the legs' angles (times, 2), first swing leg first, at times counted from the first heel strike."""
+        """Return the angles of the legs (times, 2). The leg that swings first is column 0.
+
+        times_s  (times,) times from the first heel strike
+        """
 
     def differentiate_walk(
         self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ..., kicked: bool = ...

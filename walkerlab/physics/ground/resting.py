@@ -12,7 +12,11 @@ class RestingFoot(NamedTuple):
 
 
 def resting_foot(weight: float, mass: float, stiffness: float, exponent: float, damping: float) -> RestingFoot:
-    """Compute the state of a resting foot under a weight (N, normal to the ground), for F = k d^e + c d', SI."""
+    """Compute the state of a resting foot that carries a weight, for the force F = k d^e + c d'. SI units.
+
+    weight  N, component normal to the ground
+    mass    kg, total mass of the walker
+    """
     depth = (weight / stiffness) ** (1.0 / exponent)
     slope = stiffness * exponent * depth ** (exponent - 1.0)
     return RestingFoot(depth, damping / (2.0 * math.sqrt(slope * mass)))

@@ -53,14 +53,17 @@ class Stopped:
 
 
 def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
+    """Compute the kinetic, potential and total energy (samples, 3) of every sample, in J."""
     energies = np.zeros((samples.time_s.size, 3))
     fill_energies(forms.place_on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
 def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Compute (samples, foot, 5): position along the slope, height (m), normal force, friction (N), slip (m/s)."""
+    """Compute five values for each sample and foot, (samples, 2, 5).
+
+    They are position along the slope (m), height (m), normal force (N), friction (N) and slip velocity (m/s).
+    """
     feet = np.zeros((samples.time_s.size, 2, 5))
     fill_feet(walker, samples, feet)
     return feet

@@ -159,7 +159,7 @@ def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
 
 @kernel
 def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
-    """Walk from each start (n, 4), both feet on the slope, until the observer ends the walk or it ends by itself."""
+    """Walk from each start (n, 4) with both feet on the slope, until the walk ends or the observer ends it."""
     slots = memory.slots
     waiting = 0
     for lane in range(lanes.WIDTH):

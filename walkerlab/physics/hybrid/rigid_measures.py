@@ -14,7 +14,10 @@ from walkerlab.physics.mechanics.rigid_model import Mode, RigidModel
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
-    """Compute kinetic and potential energy (samples, 2) in J of states (samples, 2 n), heights from the stance foot."""
+    """Compute kinetic and potential energy (samples, 2) in J of states (samples, 2 n).
+
+    Heights are measured from the stance foot.
+    """
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out

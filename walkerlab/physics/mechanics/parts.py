@@ -253,7 +253,7 @@ def sum_masses(assembly: Assembly, mass_levers: list[tuple[float, Floats]]) -> T
 
 
 def followers(assembly: Assembly) -> dict[int, Floats]:
-    """Return, by index of each coupled body, the weights (bodies,) with which it follows the others."""
+    """Return the weights (bodies,) with which each coupled body follows the others, by the body's index."""
     rows = {}
     for coupling in assembly.couplings:
         row = np.zeros(len(assembly.bodies))

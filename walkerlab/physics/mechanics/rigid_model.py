@@ -134,7 +134,11 @@ def models_in_turn(model: RigidModel) -> Any:
 
 
 def compute_in_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
-    """Return compute(model, *rows) for rows (n, ...) in steps (n,). Odd steps use the other leg's model."""
+    """Return compute(model, *rows), with the model of the other leg for rows that belong to odd steps.
+
+    step  (n,) number of the step of each row
+    rows  (n, ...) arrays of arguments
+    """
     if model.paired_with is None:
         return np.asarray(compute(model, *rows))
     parts = [(step % 2 == k, each) for k, each in enumerate((model, model.exchanged))]

@@ -95,7 +95,7 @@ class Attractors:
 
 @dataclass(frozen=True, eq=False)
 class WalkEnds:
-    """Outcomes of n walks, attractors reached (or UNREACHED) and numbers of steps, (n,) each."""
+    """How n walks ended: their outcomes, the attractors reached (or UNREACHED) and the numbers of steps, (n,) each."""
 
     outcome: Integers
     attractor: Integers
@@ -205,7 +205,10 @@ def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """Return the cycle (period, 3) through a point (3,), smallest angle first, or None if the walk does not return."""
+    """Return the cycle (period, 3) through a point (3,), beginning with its smallest angle.
+
+    Returns None if the walk does not return to the point.
+    """
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
         start = orbit[-1][None, :]

@@ -89,7 +89,10 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
-    """Set the angles (n,), or changes of angles, of coupled bodies that are not `fixed`, and return `angles`."""
+    """Set the entries in `angles` (n,) of coupled bodies that are not `fixed`, and return `angles`.
+
+    The entries may be angles, changes of angles, or rates.
+    """
     form = walker.whole
     n = angles.size
     shank, thigh = form.knees[stance]

@@ -59,7 +59,11 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Start from `first`. `solve` returns a solution (m,), smooth in `abscissa(value)`, near a guess, or None."""
+        """Start from the state `first`.
+
+        solve     function that returns the solution (m,) at a value near a guess, or None if there is none
+        abscissa  function of the value in which the solution is smooth
+        """
         self._solve = solve
         self._strides = strides
         self._abscissa = abscissa

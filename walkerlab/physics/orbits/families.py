@@ -294,7 +294,10 @@ class BranchFollower(BranchTracer):
     def family(
         self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
     ) -> tuple[GaitBranch, ...]:
-        """Return `previous`, new branches through the seeds, and cascades beyond flips, up to period `periods`."""
+        """Return the `previous` branches, new ones through the seeds, and the cascades beyond their flips.
+
+        periods  maximum period of a branch
+        """
         branches = list(previous)
         for seed in seeds:
             start = self.solve_at(seed.z, seed.value, seed.steps)

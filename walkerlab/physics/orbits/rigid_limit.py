@@ -190,7 +190,10 @@ class Limit:
 
 
 def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
-    """Return angles (rad) and angular velocities (rad/s), (samples, 2) each, of the legs (the thighs of kneed legs)."""
+    """Return angles (rad) and angular velocities (rad/s) of the legs, (samples, 2) each.
+
+    Those of a kneed leg are those of its thigh.
+    """
     upper = walker.legs[:, 0]
     half = states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]

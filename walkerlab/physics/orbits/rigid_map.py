@@ -369,7 +369,10 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
 
 
 def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
-    """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
+    """Reorder the angles (samples, ..., 2) of swing and stance leg, so that each column belongs to one leg.
+
+    steps  (samples,) number of the step of each sample; the leg that swings in step 0 becomes column 0
+    """
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
     return np.where(swaps, angles[..., ::-1], angles)
 

@@ -118,7 +118,7 @@ def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | Non
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Responses of step period, step length and speed to a disturbance, (3,) each, SI units."""
+    """Responses of step period, step length and speed to a disturbance, (3,) each, in SI units."""
 
     norm: Floats
     direct: Floats  # response of the disturbed step itself
