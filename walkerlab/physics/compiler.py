@@ -27,7 +27,7 @@ from numba.np import linalg
 from walkerlab.code_digest import PACKAGE, Sources, digest_of
 from walkerlab.physics.kernel_cache import cache_folder, files_of, lock_of, watchers, write_file
 
-CHECKSUM_BYTES = 32  # of SHA-256, before a kernel's stored code
+CHECKSUM_BYTES = 32  # length of the SHA-256 digest that precedes a kernel's stored code
 # index of the signature in the stored tuple
 SIGNATURE = 3
 # The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit;

@@ -31,7 +31,7 @@ PACKAGE = PHYSICS.parent
 BUILT = PHYSICS / "machine_code"
 """Folder of the machine code compiled when the package was built."""
 REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
-ABOUT = "about.json"  # in that folder: what its code depends on
+ABOUT = "about.json"  # file in that folder with the properties on which its code depends
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
 # for each platform: LLVM's names of the processor for which builds are compiled, and of the features that it must have
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {

@@ -97,7 +97,7 @@ class Reduced(NamedTuple):
 
     fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
     G: Floats  # (rows, heights + kicks)
-    covariance: Floats  # (2, rows, rows) of the rows due to heights and to kicks of unit variance
+    covariance: Floats  # (2, rows, rows) covariance of the rows due to heights, and due to kicks, of unit variance
     quantity: NDArray[np.int64]  # (rows,)
     counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)

@@ -79,7 +79,7 @@ class Information:
     # start and nuisances free
     singular_values: Floats
     directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
-    covariance: Floats  # (parameters, parameters) in the parameters' units, along determined directions
+    covariance: Floats  # (parameters, parameters) along determined directions, in the units of the parameters
     correlations: Floats  # (parameters, parameters) correlations of the estimates
     scales: Floats  # (parameters,) typical changes, in the parameters' units
     freedom: float  # degrees of freedom of Student's t for the errors
@@ -102,8 +102,8 @@ class EstimateSensitivity:
 class MeasuredRadius:
     """Spectral radius from the steps alone."""
 
-    plain: float  # by least squares, as in the literature
-    value: float  # corrected for the bias that noise causes
+    plain: float  # estimate by least squares, as in the literature
+    value: float  # estimate without the bias that noise causes
     standard_error: float
 
 

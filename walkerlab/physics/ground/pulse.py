@@ -35,8 +35,8 @@ def pulse_left(system: OnGround, t: float) -> float:
 class Push(NamedTuple):
     along: float  # N
     upward: float  # N
-    ahead: float  # m, from the foot's contact point to the hip, along the slope
-    above: float  # m, from the contact point to the hip, normal to the slope
+    ahead: float  # m, distance from the foot's contact point to the hip, along the slope
+    above: float  # m, the same distance normal to the slope
 
 
 @kernel_part

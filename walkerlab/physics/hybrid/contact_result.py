@@ -108,7 +108,7 @@ class ContactWalkResult(WalkRecord):
     max_penetration_m: float
     energy_balance_residual_J: float
     explained_residual_J: float  # largest residual that the tolerance explains
-    dissipated_J: Floats  # (5,) in the order of `energy_channels.LOSSES`
+    dissipated_J: Floats  # (5,) energies lost, in the order of `energy_channels.LOSSES`
     samples: ContactSamples | None
     method: str  # integration method
 

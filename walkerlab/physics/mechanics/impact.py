@@ -145,7 +145,8 @@ class PushOffImpulse(NamedTuple):
 
     along: float  # N s, along the slope
     upward: float  # N s, normal to the slope
-    angular: float  # N m s, on the leading leg about its contact point; an impulse through the hip turns no other body
+    # N m s, angular impulse on the leading leg about its contact point. An impulse through the hip turns no other body.
+    angular: float
     by_trailing: float  # N m s, derivative of `angular` with respect to the trailing leg's angle
     by_leading: float  # N m s, derivative with respect to the leading leg's angle
 

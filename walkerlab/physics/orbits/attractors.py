@@ -28,7 +28,7 @@ MAX_APPROACH_RATIO = 0.8
 GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
 MAX_BLOCKS = 64  # blocks per walk
 MIN_BLOCKS = 10
-BLOCK_LENGTH = 5.0  # in correlation times
+BLOCK_LENGTH = 5.0  # length of a block, in correlation times
 MAX_WALKS = 8  # maximum number of walks per exponent
 # Largest difference between the means of a walk's halves, in standard errors of the whole walk's mean. The standard
 # error of the difference is twice as large.

@@ -38,7 +38,7 @@ SOLVED_RESIDUAL = 1e-14
 MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # following a gait from a vanishing slope
-SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
+SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # strides in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
 # Relative residual. It cannot be small, because a multiplier tends to 1 as the slope vanishes.
 FOLLOWING_TOLERANCE = 1e-6
@@ -71,11 +71,11 @@ class RigidGait:
     min_normal_force: float  # N
     max_friction_ratio: float | None  # None if the ground never pushes
     max_scuff_depth: float  # m
-    min_normal_impulse: float  # N s, from the ground at heel and knee strikes
+    min_normal_impulse: float  # N s, minimum impulse of the ground at heel and knee strikes
     max_impulse_ratio: float | None  # None if the ground never pushes
     trailing_foot_rises: bool  # whether the trailing foot rises just after the heel strike
     knee_strike: float | None  # s, time from the heel strike; None for legs without knees
-    work: dict[str, float]  # J per step, by source
+    work: dict[str, float]  # J, mean work per step, by source
     cost_of_transport: float  # work divided by weight times distance
     froude: float  # speed over sqrt(g L)
     swings: int = 1  # how often the swing leg passes the stance leg in a step

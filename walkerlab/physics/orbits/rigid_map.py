@@ -396,8 +396,8 @@ class LegSwing(NamedTuple):
     walker: RigidModel
     section: StrikeSection
     slope: float
-    radius: float  # of the stance foot
-    levers: list[tuple[float, float]]  # from each body to the swing foot
+    radius: float  # radius of the stance foot
+    levers: list[tuple[float, float]]  # lever of each body to the swing foot
 
     def step_length(self, before: float, end: Floats) -> float:
         """Return a step's length from the stance leg's angle `before` (rad) at its start and the state at its `end`."""
@@ -438,7 +438,7 @@ class SimilarWalker(NamedTuple):
 
     def step_length(self, before: float, after: float) -> float:
         """Return a step's length from the stance leg's angles (rad) just after the strikes at its start and end."""
-        behind = 0.0  # along the slope, from the landing foot to the old stance foot
+        behind = 0.0  # distance along the slope from the landing foot to the old stance foot
         for start, turning, x, y in self.feet:
             psi = start + after * turning
             behind += math.cos(psi) * x - math.sin(psi) * y

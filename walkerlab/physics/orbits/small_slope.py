@@ -46,7 +46,7 @@ class SmallSlopeSeed(NamedTuple):
     name: str
     slope: float  # rad
     z: Floats  # (3,) theta_2, dtheta_1, dtheta_2 after the heel strike
-    period: float  # s, in the limit
+    period: float  # s, period in the limit
     limit: Floats  # (3,) z / slope^(1/3) in the limit
 
 
