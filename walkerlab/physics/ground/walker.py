@@ -57,7 +57,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     push_off_duration: float  # s
     onto: Integers  # (bodies of the walker,) index of each of them in this form
     first: (
-        Integers  # (n,) for each body of this form, index of the first of the walker's bodies that are merged into it
+        Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
     )
     root_along: float  # m, position of the hinge along the slope
     root_height: float  # m, height of the hinge above the slope
