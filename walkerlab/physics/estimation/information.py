@@ -100,7 +100,12 @@ def scale_covariance(covariance: Floats, scales: Floats) -> dict[str, Any]:
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Marginalise information (unknowns, unknowns) to the parameters, its first rows. Noise levels count as known."""
+    """Reduce the information `whole` (unknowns, unknowns) to that on the parameters, which are its first rows.
+
+    The other unknowns are free, and noise levels count as known.
+
+    values  number of measured values
+    """
     reduced = marginalise(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]

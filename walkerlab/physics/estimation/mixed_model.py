@@ -218,7 +218,7 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
     scale = 1.0 / np.asarray(noise.measurement)[..., rows.quantity]
     disturbed = np.einsum("...s,sij->...ij", noise.process**2, rows.covariance)
     covariance = disturbed * scale[..., None, :] * scale[..., :, None]
-    # Large disturbances would hide the noise in rounding errors, and make the matrix singular.
+    # Add rounding errors to the noise, because large disturbances would hide it in them and make the matrix singular.
     rounding = ROUNDING * np.trace(covariance, axis1=-2, axis2=-1)[..., None]
     np.einsum("...ii->...i", covariance)[...] += 1.0 + rounding
     return np.asarray(covariance)

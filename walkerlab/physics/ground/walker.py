@@ -56,9 +56,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     push_offs: Floats  # (2,) N s, impulse of each foot's pulse; `push_off` is the larger one
     push_off_duration: float  # s
     onto: Integers  # (bodies of the walker,) index of each of them in this form
-    first: (
-        Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
-    )
+    first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
     root_along: float  # m, position of the hinge along the slope
     root_height: float  # m, height of the hinge above the slope
 
@@ -176,7 +174,10 @@ def place_on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form for its knees, by default on foot 1. `level` (2,) is the ground height (m)."""
+    """Return the walker in the form that the states of its knees require, by default standing on foot 1.
+
+    level  (2,) m, height of the ground under each foot
+    """
     # Convert to arrays of fixed types, because kernels would be compiled again for others.
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(pinned), locked_knees(knee)]

@@ -27,7 +27,7 @@ def change_form(
 
     Records the energy lost and updates the tangent.
     """
-    # Locks and latches are plastic impacts, a latch also loses the elastic energy of its stop, and a release changes no
+    # Locks and latches are plastic impacts. A latch also loses the elastic energy of its stop. A release changes no
     # velocity. The tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg.
     # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
     y = method.y

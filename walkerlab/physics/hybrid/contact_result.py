@@ -197,8 +197,8 @@ def walk_on(
         tangent[: y.size] = forms.to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
-    # Forms have states of different sizes, and each size needs a method with memory of that size. They share clock and
-    # counts, so that they act as one method.
+    # Forms have states of different sizes, and each size needs a method with memory of that size. These methods share
+    # clock and counts, so that they act as one.
     by_size = {y.size: lead}
     finder = finder_for(lead, events.EVENT_ROWS, walker.size)
     while True:

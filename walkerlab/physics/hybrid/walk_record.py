@@ -118,7 +118,10 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Compute the work of `torque` (N m) in the last solver step up to fraction `until`. This overwrites the `row`."""
+    """Compute the work of `torque` (N m) in the last solver step up to fraction `until`.
+
+    row  row of the finder that may be overwritten
+    """
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
