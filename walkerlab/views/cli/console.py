@@ -21,7 +21,7 @@ QUIET_LINE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
 ENOUGH_DONE = 0.1
-"""Minimum fraction of done parts for a prediction of the remaining time. The first parts are not typical."""
+"""Minimum fraction of done parts for a prediction of the remaining time, because the first parts are not typical."""
 ENOUGH_S = 3.0
 """Minimum computing time (s) for a prediction of the remaining time."""
 

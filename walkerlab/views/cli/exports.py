@@ -48,13 +48,15 @@ class Target:
     output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
     columns: int = 1  # journal columns that a figure or a table for LaTeX spans
-    width: float | None = None  # width (pt) of a figure; None for that of the columns
+    width: float | None = None  # width (pt) of a figure; None for the width of `columns`
     dpi: int = EXPORT_DPI  # pixels per inch of a figure
 
     def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """Return file and format (default: first of `kinds`).
+        """Return the file to write and its format, by default the first of `kinds`.
 
-        Raises ConfigError for an unknown format or a protected file.
+        what  the exported item, for messages
+        stem  name of the file without its ending, if the user gave none
+        Raises ConfigError for an unknown format, or if the file must not be overwritten.
         """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
@@ -213,7 +215,8 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
-    near = "" if name.startswith("figure-") else suggestion(name, names)  # numbers of figures are not misspelt
+    # The figure with the most similar number is not what a user meant.
+    near = "" if name.startswith("figure-") else suggestion(name, names)
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
@@ -227,7 +230,7 @@ def plan_run(folder: RunFolder) -> Planner:
 
 
 def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
-    """Draw a figure as on the page, with the target's size.
+    """Draw a figure as on the page, but at the target's size, and return the file's bytes.
 
     Raises StaleError if its results are missing.
     """
@@ -300,7 +303,7 @@ def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
     """Return a walk over time as CSV (a column per variable and leg) or netCDF.
 
-    Raises StaleError if none is stored.
+    Raises StaleError if no trajectory is stored.
     """
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
@@ -338,9 +341,9 @@ class Film:
 
 
 BOTH = "both"
-"""Name of a film that shows both models in one picture."""
+"""Value of `Film.model` that shows both models in one picture."""
 MAX_GIF_RATE = 50
-"""Browsers show a picture of less than 20 ms for 100 ms."""
+"""Maximum frame rate (frames per second). Browsers show a frame shorter than 20 ms for 100 ms."""
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
@@ -365,8 +368,9 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     if kind == "gif" and film.rate > MAX_GIF_RATE:
-        raise ConfigError(f"browsers slow a GIF above {MAX_GIF_RATE} frames per second.", "Lower --rate, or use .mp4.")
-    # Imported here: a file that cannot be written is refused before drawing code is loaded.
+        message = f"browsers slow down GIFs with more than {MAX_GIF_RATE} frames per second."
+        raise ConfigError(message, "Lower --rate, or use .mp4.")
+    # Imported here: if the file cannot be written, the user should not have to wait for the drawing code.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
     rigid, contact = MODEL_NAMES
@@ -398,7 +402,8 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
-    # A GIF counts hundredths of a second. Rounded ends of pictures keep the whole film in time.
+    # A GIF counts hundredths of a second. The frames' ends are rounded, because rounded durations would add up to an
+    # error of the whole film.
     durations_ms = 10 * np.diff(np.round(100 * np.arange(len(frames) + 1) / rate)).astype(int)
     file = io.BytesIO()
     frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=durations_ms.tolist(), loop=0)
@@ -413,8 +418,8 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
-    # Many players show only yuv420p. ffmpeg cannot go back in a pipe to write the index of the file, so it writes
-    # fragments.
+    # Many players show only yuv420p. The fragments are needed because ffmpeg writes to a pipe, in which it cannot go
+    # back to write the index of an ordinary MP4.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

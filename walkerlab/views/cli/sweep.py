@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, option, print_result, switch
+from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Request, option, print_result, switch
 from walkerlab.views.report.tables import paragraph
 
 if TYPE_CHECKING:
@@ -195,5 +195,7 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
 
 
 COMMANDS = (
-    Offer(sweep, (*SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest),
+    Offer(
+        sweep, (*SWEEP_FIELDS, *RUN_OPTIONS, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest
+    ),
 )

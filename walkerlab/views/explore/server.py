@@ -212,7 +212,7 @@ class Desk:
         with self._count:
             self._newest += 1
             number = self._newest
-        # The worker is busy with an earlier request, which nobody waits for any more.
+        # The worker is busy with an earlier request, for which nobody waits any more.
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
@@ -399,7 +399,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def check_token(self, token: str) -> bool:
         """Check the token, and answer with status 401 if it is wrong. Return whether it is right."""
-        # The time of an ordinary comparison tells how many characters are right.
+        # An ordinary comparison takes longer the more characters are right, which would help to guess the token.
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))

@@ -40,9 +40,9 @@ HIDDEN_KEYS: Final = (
     "robustness",
 )  # fmt: skip
 """Keys that do not affect a walk."""
-AROUND: Final = 5.0
+SLIDER_FACTOR: Final = 5.0
 """Factor between a slider's initial value and either end of its range."""
-FAR_AROUND: Final = 100.0
+WIDE_SLIDER_FACTOR: Final = 100.0
 """Factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
 DECADES: Final = 100.0
@@ -83,7 +83,11 @@ def rank(key: str, first: Any) -> int | None:
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
-    """Return the choices or the slider range of a key, or neither if its value must be typed."""
+    """Return the choices or the slider range of a key, or nothing if its value must be typed.
+
+    first  value before any change
+    start  config before any change
+    """
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
@@ -101,7 +105,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         least = 0.0 if low >= 0.0 else -ordinary
         most = ordinary
     else:
-        by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
+        by = WIDE_SLIDER_FACTOR if any(part in key for part in BY_MAGNITUDE) else SLIDER_FACTOR
         least, most = sorted((first / by, first * by))
         logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
         # A slider that starts close to zero must reach the typical size.
@@ -191,7 +195,7 @@ class GivingWay(Silent):
 
 @dataclass(frozen=True)
 class ExploredConfig:
-    """A config with changes."""
+    """A config with the changes made on the page."""
 
     config: str | None  # value of `--config`
     sets: tuple[str, ...]  # values of `--set`
@@ -241,7 +245,7 @@ def memory() -> MemoryResults:
 
 
 def walk(question: ExploredConfig) -> Answered:
-    """Compute the gait and the walks, with the data that the player needs."""
+    """Compute the gait and the walks of a config, and the data with which the player shows them."""
     try:
         loaded = question.loaded
         config = loaded.config
@@ -319,7 +323,7 @@ def config_text(question: ExploredConfig, name: str) -> str:
 
     If the starting point has another type of walker, the whole config is written.
 
-    Raises ConfigError if invalid.
+    Raises ConfigError if the config is invalid.
     """
     start = config_to_extend(question.config)
     named = replace(question, changes={**question.changes, "name": name})

@@ -31,9 +31,9 @@ HEIGHT_EXPONENT = 0.7
 """Height of a figure is proportional to its width raised to this power. It is below 1 because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Multiples of powers of ten that are labelled on an axis, after the largest ratio of its limits that they suit."""
+"""Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
-MAX_MINOR_SPAN: Final = 1e4
+MAX_PLAIN_NUMBER: Final = 1e4
 """Largest number written without an exponent."""
 
 
@@ -79,7 +79,7 @@ def label_of(words: str, unit: str) -> str:
 def label_ticks(axis: Axis) -> None:
     """Label as many decades of a logarithmic axis as fit, and values between them if the axis spans few."""
     least, last = axis.get_view_interval()
-    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, MAX_MINOR_SPAN)), ())
+    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, MAX_PLAIN_NUMBER)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))

@@ -142,7 +142,8 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the parameter values and quantities to plot between two points of a branch, given by index."""
-    # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance.
+    # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance. A
+    # straight line to the first computed gait would show a sharp corner.
     value = curve.value[begin : end + 1]
     quantity = curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
@@ -160,14 +161,14 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 
 ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
-"""Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
+"""Margin around the stable gaits, relative to their span. Unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
 """Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
 """
-TOLD_APART: Final = 0.04
+MIN_LABEL_DISTANCE: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
-CLOSER: Final = 0.8
-"""Fraction of the full range below which the range around the bifurcations is shown in panels of its own."""
+MAX_DETAIL_FRACTION: Final = 0.8
+"""The bifurcations get panels of their own if their range is less than this fraction of the full range."""
 POINTS_BETWEEN: Final = 16
 """Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
 
@@ -216,8 +217,8 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait of fewest
-    steps is listed.
+    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait with the
+    fewest steps is listed.
     """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
@@ -225,7 +226,7 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
     ]
     births: list[tuple[float, int]] = []
     for period, value in sorted(folds):
-        apart = all(abs(value - other) > TOLD_APART * (shown[1] - shown[0]) for other, _ in births)
+        apart = all(abs(value - other) > MIN_LABEL_DISTANCE * (shown[1] - shown[0]) for other, _ in births)
         if shown[0] <= value <= shown[1] and apart:
             births.append((value, period))
     return sorted(births)
@@ -240,7 +241,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def closer_view(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor, or None if that is no closer view."""
+    """Return the parameter range around the bifurcations and any attractor, or None if it is nearly the full range."""
     summary = results[CONTINUATION_STAGE].summary
     values = [item["value"] for item in summary["bifurcations"]]
     if not values:
@@ -251,7 +252,7 @@ def closer_view(results: Results) -> tuple[float, float] | None:
     most = max(*ends, max(values))
     room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     close = max(least - room, summary["from"]), min(most + room, summary["to"])
-    return close if close[1] - close[0] < CLOSER * (summary["to"] - summary["from"]) else None
+    return close if close[1] - close[0] < MAX_DETAIL_FRACTION * (summary["to"] - summary["from"]) else None
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
@@ -293,11 +294,11 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
 
 
 GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMILLION, GREY)}
-"""Colours of each model's one-step gaits, in the order in which they were found; line styles are those of `DASHES`."""
+"""Colours of each model's one-step gaits, in the order in which they were found. `DASHES` has their line styles."""
 DASHES: Final = ("-", "--", "-.", ":")
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 FARTHEST: Final = 1.6
-"""Half-width of the visible part of the complex plane; multipliers of unstable gaits may lie far outside."""
+"""Half-width of the visible part of the complex plane. Multipliers of unstable gaits may lie far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:

@@ -23,7 +23,7 @@ FIGURE_HEIGHT = 4.6
 SMALL = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Dimensions up to this length (leg lengths) have a label but no arrow, and soles no mark at their centre."""
+"""Up to this length (leg lengths), a dimension gets a label but no arrow, and a sole no mark at its centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
@@ -42,7 +42,7 @@ LINE_SPACING = 0.0195
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
 TITLE = 0.4
-"""Height (in) that the title of a panel takes."""
+"""Height of the title of a panel (in)."""
 PARTS_ROOM = 1.5
 """Height of a body's panel relative to the body."""
 
@@ -204,7 +204,7 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
-    # the other leg, behind and off the ground, with its knee bent if it has one
+    # The other leg is behind and off the ground. If it has a knee, the knee is bent.
     second = [leg.joints[0]]
     angles = (SECOND_LEG_ANGLE, BENT_ANGLE)[: len(other.joints)]
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):

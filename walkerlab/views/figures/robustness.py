@@ -90,7 +90,7 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
 
 
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
-    """Return the values (points,) of a model in each row of a table: one for each leg of a pair that differs."""
+    """Return the values (points,) of a model for each of its rows in a table. Legs that differ have a row each."""
     rows = []
     for row in range(MOST_ROWS):
         if name.format(row) in group.variables:

@@ -50,7 +50,7 @@ SIDEROOM = 0.12
 """Free space on either side of the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""Angles (rad) of the points of a sole's arc, and of its middle, from the leg's line."""
+"""Angles (rad) from the leg's line at which points of a sole lie: all points drawn (`ARC`), and the middle."""
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
@@ -114,7 +114,10 @@ class Sticks:
         return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
 
     def arc(self, leg: int, above: Array, angles: Array) -> Array:
-        """Return points of a sole (samples, angles, 2) at angles (rad) from the line of the leg through its centre."""
+        """Return points of a sole's arc (samples, angles, 2), at angles (rad) from the line through its centre.
+
+        The line starts at the joint `above` (samples, 2), which is the knee or the hip.
+        """
         centre = self.feet[:, leg] + np.array([0.0, self.radii[leg]])
         down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
         ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
@@ -129,7 +132,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the indices of the first cycle's samples at its start and heel strikes, and of samples in between."""
+        """Return the indices of samples in the first cycle: at its start and heel strikes, and some in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, POSTURES_BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         # A walk that ends within its first cycle is drawn up to its end.
@@ -276,7 +279,7 @@ def entries(sticks: Sticks) -> list[Artist]:
 
 
 PAD_HEIGHT = 0.028
-"""Thickness of a drawn pad (leg lengths); the model's pads have none."""
+"""Thickness of a drawn pad (leg lengths). In the model, pads have no thickness."""
 PADS: Final[tuple[dict[str, Any], ...]] = tuple(
     {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
     for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
@@ -322,7 +325,7 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
 FILM_NEEDS = {
     stage: Need(stage, TRAJECTORY, (*STATE_VARIABLES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
-"""Variables that an animation needs; a walk that ends in its first step can be animated too."""
+"""Variables that an animation needs. Steps are not among them, because a walk can end in its first step."""
 FIGURE_2, FIGURE_6 = (
     paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
     for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
@@ -345,8 +348,12 @@ RELIEF_DEPTH = 0.075
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Return frame times (s) of an animation, by default of four steps or, for a fall, the last four and the fall."""
-    # The last frame of a fall is shown for a second, so that the fall can be seen.
+    """Return the times (s) of an animation's frames. The last frame of a fall lasts a second, so that it can be seen.
+
+    steps   number of steps shown, from the first; None: four or, for a fall, the last four and the fall
+    rate    frames per second
+    slower  slow-motion factor
+    """
     begin = 0
     shown = STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
@@ -381,7 +388,7 @@ def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
         lines += [sticks.sole(leg) for leg in range(2)]
     if sticks.head is not None:
         lines.append(np.stack((sticks.hip, sticks.head), axis=1))
-    # Linear interpolation is exact enough, because both sides of a heel strike are samples and no interval spans one.
+    # Linear interpolation suffices: both sides of a heel strike are samples, so no interval contains its jump.
     flat = [line.reshape(line.shape[0], -1) for line in lines]
     places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
     return [sticks.project(place.reshape(at.size, -1, 2)) for place in places]

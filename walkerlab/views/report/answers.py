@@ -177,7 +177,7 @@ def each_step(summary: Summary) -> dict[str, Summary]:
 
 
 def settling_sentences(summary: Summary) -> Iterator[str]:
-    """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
+    """Yield sentences about the gait that a walk leaves, and about the cycle of steps with which it ends."""
     from walkerlab.views.report.sections.walks import format_step
 
     steps = summary["steps"]

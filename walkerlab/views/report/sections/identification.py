@@ -123,9 +123,9 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 
 
 def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the fixed parameters, the most influential first, with the change of each estimate if one is 1 % larger.
+    """Return a row for each fixed parameter: how much every estimate changes if the parameter is 1 % larger.
 
-    A parameter is left out if its change moves all estimates by less than half a standard error.
+    The most influential parameter comes first. One that changes no estimate by half a standard error is left out.
     """
     rows = dict[str, dict[str, Any]]()
     errors = {row["key"]: row["standard_error"] for row in estimates}
