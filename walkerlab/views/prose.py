@@ -37,7 +37,7 @@ class Prose:
     """Renders paragraphs from a folder of templates as plain text."""
 
     folder: Path
-    filters: Sequence[Callable[..., Any]]  # functions that templates may call by name; an unknown name is an error
+    filters: Sequence[Callable[..., Any]]  # functions that templates may use as filters
     known: Mapping[str, Any]  # global variables of the templates
 
     @cached_property
@@ -61,9 +61,9 @@ class Prose:
         return BLANKS.sub(" ", said).strip()
 
     def parts(self, name: str, *values: Any) -> list[str]:
-        """Split a text at its | marks, dropping empty parts."""
+        """Render a text, and split it at its | marks, dropping empty parts. The arguments are those of a call."""
         return parts(self(name, *values))
 
     def terms(self, name: str, *values: Any) -> dict[str, str]:
-        """Return the words and meanings in a macro whose parts have the form 'word: meaning'."""
+        """Return the meaning of each word in a macro whose parts have the form 'word: meaning'."""
         return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

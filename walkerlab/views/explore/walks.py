@@ -70,7 +70,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
         if value is not None:
             unit, meaning = described(config, key)
             shown = {"key": key, "value": value, "start": first, "unit": unit, "meaning": meaning}
-            turned = reach(key, first, unit, field, start)
+            turned = input_of(key, first, unit, field, start)
             yield shown | {"rank": rank(key, first) if turned else None, "bounds": bounds_of(field)} | turned
 
 
@@ -82,7 +82,7 @@ def rank(key: str, first: Any) -> int | None:
     return next(places, None)
 
 
-def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
+def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
     """Return the choices or the slider range of a key, or nothing if its value must be typed.
 
     first  value before any change
@@ -296,11 +296,11 @@ def follow_gaits(question: ExploredConfig) -> Answered:
         return SUPERSEDED
     # Attractors are skipped: they have step periods but are not branches.
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
-    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
+    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if is_walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 
 
-def walkable(branch: Group) -> bool:
+def is_walkable(branch: Group) -> bool:
     """Whether a branch has a gait in which the ground never has to pull."""
     forces = branch.variables.get("min_normal_force_N")
     return forces is None or bool((forces.values > 0.0).any())

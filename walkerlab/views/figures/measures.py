@@ -237,7 +237,7 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
         level = dimension.start[1] == dimension.end[1]
         if level or dimension.value <= SMALL_ARC * length:
             labels.append((dimension.label, VERMILLION if level else BLUE, dimension.end))
-        elif free := [lane for lane in lanes if all(clear(dimension, second, length) for second in lane)]:
+        elif free := [lane for lane in lanes if all(fit_in_lane(dimension, second, length) for second in lane)]:
             free[0].append(dimension)
         else:
             lanes.append([dimension])
@@ -249,7 +249,7 @@ def letters(texts: Sequence[str]) -> int:
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
-def clear(dimension: Length, second: Length, length: float) -> bool:
+def fit_in_lane(dimension: Length, second: Length, length: float) -> bool:
     """Whether two dimensions in one lane, and their labels, do not overlap."""
     between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
     # Slightly less than half of both, so that dimensions may meet end to end.

@@ -58,7 +58,7 @@ def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration 
     if can_be_drawn(group, parameters):
         return paper_figure(17, (), partial(plot_over_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
-    return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
+    return None if driven is None else Illustration("push-off-or-hip", (), partial(plot_drives, group, driven))
 
 
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
@@ -109,7 +109,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
     return driven if bool(np.all(np.sum([*driven.values()], axis=0) == 1)) else None
 
 
-def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
+def plot_drives(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
     """Plot the cost of each drive, and the disturbances that its gaits survive, over speed."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)

@@ -74,7 +74,7 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
     # If one of two parameters has few values, each gets a line instead of a map.
     a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
     if against:
-        figure = one_over_another(group, names, against)
+        figure = plot_against(group, names, against)
     elif dimensions != 2:
         figure = plot_scatter(group, parameters, names)
     else:
@@ -86,7 +86,7 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
     return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
 
 
-def one_over_another(group: Group, names: Sequence[str], against: str) -> Figure:
+def plot_against(group: Group, names: Sequence[str], against: str) -> Figure:
     """Plot each quantity over the quantity `against`, a row each, and join the points in order if one
     parameter varies.
     """

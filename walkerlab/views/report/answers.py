@@ -125,7 +125,7 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 
 STEP_HEADS = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 WALK_ROWS = (
-    *gaits.works(partial(number, digits=4)),
+    *gaits.work_columns(partial(number, digits=4)),
     walk_row("speed", "speed_m_s"),
     walk_row("Froude number", "froude"),
     walk_row("cost of transport", "cost_of_transport"),

@@ -210,7 +210,7 @@ class Section:
     anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""  # one-sentence result; if there is one, the section is folded and shows only this sentence
+    finding: str = ""  # result in brief; if there is one, the section is folded and shows only this text
     page: str = MAIN  # file of the page
 
     @classmethod

@@ -21,7 +21,7 @@ LEG_CHANNELS = {
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
 }  # fmt: skip
-"""Name of the channel for each stored variable."""
+"""Channel of each stored variable that has a value for each leg. The index of the leg is appended to it."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -65,7 +65,7 @@ class Track:
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
     def pack(self) -> str:
-        """Encode all channels, in order, as little-endian float32 in base64."""
+        """Encode all channels, one after the other, as little-endian float32 in base64."""
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
@@ -97,5 +97,5 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Return the time between samples (s), in proportion to the leg's pendulum time."""
+    """Return the time between samples (s), in proportion to the leg's pendulum time: small walkers move faster."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

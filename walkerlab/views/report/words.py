@@ -26,7 +26,7 @@ def ends(outcome: str) -> str:
 
 
 def walks(steps: int, outcome: str) -> str:
-    """Describe how far a walker gets, as the predicate of a sentence about it."""
+    """Describe how far a walker gets, as a predicate: 'walks all 10 steps', or 'walks 3 steps and then falls'."""
     if outcome == WALKED_LABEL:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
@@ -51,7 +51,7 @@ ERROR_TEXTS = {
 
 
 MUCH_SMALLER = 0.01
-"""Ratio of the last step's error to the largest one below which the answer gives both."""
+"""The answer also gives the error of the last step if it is less than this fraction of the largest one."""
 
 
 def describe_error(error: Mapping[str, Any]) -> str:
@@ -68,12 +68,12 @@ def describe_error(error: Mapping[str, Any]) -> str:
 
 
 def legs_differ(gait: Mapping[str, Any]) -> bool:
-    """Whether a gait is that of a walker with different legs, so that only its strides have multipliers."""
+    """Whether a gait is that of a walker with different legs. Then only its strides have multipliers, not its steps."""
     return "gait_steps" in gait and "multipliers" not in gait
 
 
 def describe_limp(gait: Mapping[str, Any]) -> str:
-    """Describe, after a multiplier, the difference between the steps of both legs, or return '' for equal legs."""
+    """Continue a sentence that ends in a multiplier with the difference between both legs' steps, if they differ."""
     if not legs_differ(gait):
         return ""
     period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))

@@ -9,7 +9,7 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 WORSE = 0.01
-"""Relative change of a measure of robustness from which it counts as worse."""
+"""Relative change above which a measure of robustness counts as worse."""
 FIRST_TABLES = 2
 """Number of tables that the terminal shows by default."""
 MAX_DERIVATIVES = 12
@@ -17,7 +17,7 @@ MAX_DERIVATIVES = 12
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity that ranks the parameters; dimensionless, since a norm in s/m depends on the walker's size."""
+"""Quantity that ranks the parameters. It is dimensionless, because a norm in s/m depends on the walker's size."""
 MODEL_COLUMN = Column("model", "model")
 LEG_COLUMN = Column("swing leg", "leg")
 NORM_COLUMNS = (
