@@ -195,7 +195,7 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     """Find a figure or table by name.
 
-    Raises ConfigError, which lists the items of the run, for an unknown name.
+    Raises ConfigError for an unknown name. Its advice lists the items of the run.
     """
     # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.stage import FIGURES

@@ -235,7 +235,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         if error.errno == errno.ENAMETOOLONG:
             too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
             raise fail(too_long) from None
-        # An error without a file name is one of the output.
+        # An OSError without a file name comes from writing the output.
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()

@@ -34,7 +34,7 @@ FIRST: Final = (
 )  # fmt: skip
 """Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
-"""Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
+"""Blocks of which only non-zero keys are shown before any search."""
 HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
@@ -75,7 +75,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
 
 
 def rank(key: str, first: Any) -> int | None:
-    """Return a key's position among those shown initially, or None if it appears in searches only."""
+    """Return the position of a key among those shown before any search, or None if it appears in searches only."""
     if (key.startswith(DRIVES) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
     places = (index for index, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
@@ -148,7 +148,7 @@ def gaits_by(key: str, start: Config) -> Parameter | None:
 
 
 def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
-    """Return the valid value closest to a slider's end, with the config's other values kept."""
+    """Return the value closest to a slider's end that is valid together with the config's other values."""
     if parameter.config_at(start, end) is not None:
         return end
     good = first

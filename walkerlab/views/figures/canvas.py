@@ -26,9 +26,9 @@ from walkerlab.views.figures.style import FIGURE_WIDTH, NARROW, NARROW_BELOW, PN
 MAX_FILL = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
 ROWS = 3
-"""Legend rows that fit in a figure's nominal height; longer legends make the figure taller."""
+"""Number of legend rows that fit in a figure's nominal height. Longer legends make the figure taller."""
 HEIGHT_EXPONENT = 0.7
-"""Height of a figure is proportional to its width raised to this power. It is below 1 because text hardly shrinks."""
+"""A figure's height is proportional to its width raised to this power. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""

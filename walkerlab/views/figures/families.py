@@ -73,7 +73,7 @@ class DrawnBranch:
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
-    """Yield the groups called `name` (branch or curve) of each model, in the order in which they were followed."""
+    """Yield the branches or curves (`name`) of each model, in the order in which they were followed."""
     groups = results[CONTINUATION_STAGE].groups
     for model in MODEL_COLOURS:
         for number in count():
@@ -119,8 +119,9 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations, and return the kinds of the
-    bifurcations.
+    """Plot a quantity of every step along a branch, and the bifurcations, and return the kinds of the bifurcations.
+
+    Lines are solid where gaits are stable, otherwise dashed.
     """
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
@@ -233,7 +234,7 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
 
 
 def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
-    """Label gaits born in folds above the axes, since some of their windows are as thin as a line."""
+    """Label gaits born in folds above the axes, because they may be stable only in windows as narrow as a line."""
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])

@@ -125,7 +125,10 @@ def draw_trade_off(results: Results) -> Drawn:
 
 
 def semi_axis_of_region(freedom: float) -> float:
-    """Return the semi-axis (standard errors) of a 95 % region of two parameters: sqrt(2 F), F(2, `freedom`) at 95 %."""
+    """Return the semi-axis (standard errors) of a 95 % region of two parameters.
+
+    It is sqrt(2 F), where F is the 95 % quantile of the F distribution with 2 and `freedom` degrees of freedom.
+    """
     return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 

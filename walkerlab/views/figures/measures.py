@@ -165,7 +165,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
 
 @dataclass(frozen=True)
 class View:
-    """Part of the plane (m) around a leg that shows all its labels, and where they are."""
+    """Part of the plane (m) that shows a leg with all its labels, and the positions of the labels."""
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
     heights: list[float]  # height of each of these labels

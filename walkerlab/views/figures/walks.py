@@ -204,8 +204,7 @@ def draw_states(results: Results) -> Drawn:
 
 CYCLES = 20
 """Number of strides shown. Later strides would only overlap, because the transient has ended by then."""
-LAST_STRIDE = 2
-"""Steps per stride."""
+STEPS_PER_STRIDE = 2
 EARLIER_WIDTH = 0.5
 ARROW_LENGTH = 0.06
 """Length of an arrow on the cycle, as a fraction of the samples of a swing or stance."""
@@ -222,7 +221,7 @@ def draw_cycles(results: Results) -> Drawn:
         panel.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
     axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
     key = [entry(walk.look.label, **walk.look.line) for walk in walks]
-    if any(walk.strikes.size > LAST_STRIDE for walk in walks):
+    if any(walk.strikes.size > STEPS_PER_STRIDE for walk in walks):
         key.append(entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH))
     for look in (walk.look for walk in walks):
         for whose, face in (("own", look.colour), ("other", "white")):
@@ -239,9 +238,9 @@ def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     velocity = walk["velocity"][:, leg]
     look = walk.look
     axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
-    last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
+    last = walk.time >= (walk.strikes[-1 - STEPS_PER_STRIDE] if walk.strikes.size > STEPS_PER_STRIDE else 0.0)
     line(axes, angle[last], velocity[last], look)
-    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
+    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-STEPS_PER_STRIDE:]) - 1, 0)
     strikes_itself = walk["stance_leg"][before] != leg + 1
     for rows, face in ((before[strikes_itself], look.colour), (before[~strikes_itself], "white")):
         axes.plot(

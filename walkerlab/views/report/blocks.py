@@ -56,7 +56,7 @@ class Shares:
     """Counts that make up a whole, shown as a bar with a legend."""
 
     title: str
-    parts: tuple[tuple[str, int, Tone], ...]
+    parts: tuple[tuple[str, int, Tone], ...]  # label, count and tone of each part
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Walker:
     strikes: tuple[float, ...]  # times of the heel strikes (s)
     # postures, each a line through the joints: mm along the slope, and mm normal to it (down is positive)
     stills: tuple[tuple[tuple[int, int], ...], ...]
-    ends: str = ""
+    ends: str = ""  # how the walk failed, in words; empty if it did not
     pushes: bool = False  # whether the trailing foot pushes off as the other foot lands
 
     @property

@@ -21,7 +21,7 @@ from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture, Section
 from walkerlab.views.report.numbers import CARET, POWER, power, to_superscript
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
-"""Page of each figure by the first part of its name; all other figures are on the main page."""
+"""Page of each figure by the first part of its name. All other figures are on the main page."""
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 

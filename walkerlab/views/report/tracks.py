@@ -31,10 +31,16 @@ Channels = dict[str, Array]
 class Track:
     """The motion of one walker, an array for each channel."""
 
-    # channels by name, of equal length: 't' time (s); 'h' hip, 'f' lowest points of the feet and 'k' knees, each with x
-    # along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s); 'b' angle of the
-    # shanks, 'u' of the torso; 's' stance leg; 'n', 'd' normal force and friction (N); 'p' penetration and 'q' slip
-    # since touchdown (m); 'ke', 'pe', 'me' energies (J); a final digit is the leg
+    # Channels by name, all of the same length. A final digit is the index of the leg.
+    # t           time (s)
+    # hx, fx, kx  positions of the hip, of the lowest points of the feet and of the knees, along the slope (m)
+    # hy, fy, ky  heights of these points above the slope (m)
+    # a, v        angle and angular velocity of the legs or thighs (rad, rad/s)
+    # b, u        angles of the shanks and of the torso (rad)
+    # s           stance leg
+    # n, d        normal force and friction (N)
+    # p, q        penetration, and slip since touchdown (m)
+    # ke, pe, me  kinetic, potential and mechanical energy (J)
     channels: Channels
 
     def __getitem__(self, name: str) -> Array:

@@ -113,9 +113,8 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     norms = summary["gait_sensitivity_norm"]
     legs_differ = any("leg" in row for row in norms)
     columns = (MODEL_COLUMN, *([LEG_COLUMN] if legs_differ else []), *NORM_COLUMNS)
-    ranked = sorted(
-        (row for row in rows if can_be_ranked(row)), key=lambda row: -abs(row["relative"])
-    )  # both models together
+    # The derivatives of both models are ranked together.
+    ranked = sorted((row for row in rows if can_be_ranked(row)), key=lambda row: -abs(row["relative"]))
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]

@@ -113,7 +113,7 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """Return the end time of a walk (s) and the hip's height at its end (m), with None for values that are not stored."""
+    """Return the end time of a walk (s) and the hip's height at its end (m), or None for values that are not stored."""
     summary = results.summary(stage)
     trajectory = results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
