@@ -35,7 +35,7 @@ def main() -> None:
     def format_warning(
         message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None
     ) -> str:
-        # Imported here: help must not load the compiler; when a cache warning appears, the compiler is loaded already.
+        # Imported here, because help must not load the compiler. A cache warning appears only after that is loaded.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning

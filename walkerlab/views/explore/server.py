@@ -171,7 +171,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
             closeup_m=1.0,
             view=(0, 0, 1, 1),
         ),
-        # Markup only for the package's own files; all other texts are escaped.
+        # Only the package's own files are markup. All other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),
     )

@@ -201,7 +201,7 @@ def render(page: Page) -> str:
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
-    # Markup only for the package's own files; all other texts are escaped.
+    # Only the package's own files are markup. All other texts are escaped.
     trusted = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
     return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **trusted)
 

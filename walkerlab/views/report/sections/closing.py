@@ -15,7 +15,7 @@ from walkerlab.views.report.words import words
 
 def provenance_section(results: Results) -> Section | None:
     stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # these have a provenance
-    note = "A key covers config, inputs and code; equal keys give equal digests. Neither includes timings."
+    note = "A key covers config, inputs and code. Equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
         table("Computation of each result", RESULT_COLUMNS, stored),
