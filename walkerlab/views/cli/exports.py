@@ -106,7 +106,7 @@ TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "t
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY = "trajectory"
 STEPS = "steps"
-STORED_WITH = "Run it with outputs: [states, energies, forces]."
+OUTPUTS_ADVICE = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
@@ -309,7 +309,7 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
         stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
     if group is None:
-        raise StaleError("the walk was stored without a trajectory.", STORED_WITH)
+        raise StaleError("the walk was stored without a trajectory.", OUTPUTS_ADVICE)
     if kind == "nc":
         # Imported here: CSV needs no HDF5.
         from walkerlab.pipeline.store import hdf5
@@ -380,7 +380,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
         for model in (shown, *behind):
             reason = FILM_NEEDS[model].missing_in(results, {})
             if reason is not None:
-                raise StaleError(f"the walk cannot be drawn: {reason}.", STORED_WITH)
+                raise StaleError(f"the walk cannot be drawn: {reason}.", OUTPUTS_ADVICE)
         sticks = read_sticks(walk)
         other = read_sticks(others[0]) if others else None
         times = film_times(sticks, film.steps, film.rate, film.slower)

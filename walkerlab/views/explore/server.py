@@ -128,19 +128,21 @@ class Job:
 
 
 TEMPLATES = Path(__file__).parent / "templates"
-SEEN = (
+PLAYER_CAPTION = (
     "Wide outline: rigid model; narrow: contact model. Each leg is a line from hip to foot;"
     " leg 2 is hollow. Arrows are ground forces; a red arrow is a push-off."
 )
 
 
-LONGEST_NAME = 60
+MAX_NAME_CHARACTERS = 60
 
 
 def start_name(base: ExploredConfig) -> str:
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
-    return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+    return (
+        name if base.called or not base.sets else changed if len(changed) <= MAX_NAME_CHARACTERS else f"{name}, changed"
+    )
 
 
 def choices(base: ExploredConfig) -> list[str]:
@@ -162,7 +164,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         # An empty player, which the script fills.
         block=Player(
             title="The walk.",
-            caption=SEEN,
+            caption=PLAYER_CAPTION,
             alt="The walker",
             walkers=(),
             slope_rad=0.0,
@@ -180,7 +182,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
 
 
 LONGEST_BODY = 100_000
-NICE = 15
+NICENESS = 15
 
 
 def failure(status: int, message: str, advice: str = "") -> Answered:
@@ -201,7 +203,7 @@ class Desk:
     def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
         if self.drops:  # background work yields to other processes
-            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
+            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICENESS)
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:

@@ -28,12 +28,12 @@ from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections import motion
 
-FIRST: Final = (
+INITIAL_KEYS: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
 """Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
-DRIVES: Final = ("walker.hip.", "push_off.")
+DRIVE_BLOCKS: Final = ("walker.hip.", "push_off.")
 """Blocks of which only non-zero keys are shown before any search."""
 HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
@@ -45,9 +45,9 @@ SLIDER_FACTOR: Final = 5.0
 WIDE_SLIDER_FACTOR: Final = 100.0
 """Factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
-DECADES: Final = 100.0
+MIN_LOGARITHMIC_RATIO: Final = 100.0
 """Ratio of bounds above which a slider is logarithmic."""
-HALVINGS: Final = 10
+BISECTIONS: Final = 10
 """Number of bisections to find the last valid value of a slider."""
 
 
@@ -76,9 +76,11 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
 
 def rank(key: str, first: Any) -> int | None:
     """Return the position of a key among those shown before any search, or None if it appears in searches only."""
-    if (key.startswith(DRIVES) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
+    if (key.startswith(DRIVE_BLOCKS) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
-    places = (index for index, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
+    places = (
+        index for index, name in enumerate(INITIAL_KEYS) if key == name or (name[-1] == "." and key.startswith(name))
+    )
     return next(places, None)
 
 
@@ -107,7 +109,7 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -
     else:
         by = WIDE_SLIDER_FACTOR if any(part in key for part in BY_MAGNITUDE) else SLIDER_FACTOR
         least, most = sorted((first / by, first * by))
-        logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
+        logarithmic = first > 0.0 and low >= 0.0 and high > MIN_LOGARITHMIC_RATIO * low
         # A slider that starts close to zero must reach the typical size.
         most = max(most, ordinary) if logarithmic else most
     # The slope's bounds are in radians, unlike its slider.
@@ -153,7 +155,7 @@ def last_allowed(parameter: Parameter, start: Config, first: float, end: float) 
         return end
     good = first
     bad = end
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (good + bad)
         good, bad = (good, middle) if parameter.config_at(start, middle) is None else (middle, bad)
     return good
@@ -163,7 +165,7 @@ WALK_STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
-MOST_STEPS_SHOWN = 100
+MAX_STEPS_SHOWN = 100
 """Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
 """Signal that makes a worker abandon its request."""
@@ -266,7 +268,7 @@ def walk(question: ExploredConfig) -> Answered:
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage]
-    if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
+    if (player := motion.player(Results(config, walks), MAX_STEPS_SHOWN)) is not None:
         answer["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
         answer["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))

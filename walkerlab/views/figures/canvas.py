@@ -25,7 +25,7 @@ from walkerlab.views.figures.style import FIGURE_WIDTH, NARROW, NARROW_BELOW, PN
 
 MAX_FILL = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
-ROWS = 3
+LEGEND_ROWS = 3
 """Number of legend rows that fit in a figure's nominal height. Longer legends make the figure taller."""
 HEIGHT_EXPONENT = 0.7
 """A figure's height is proportional to its width raised to this power. It is below 1, because text hardly shrinks."""
@@ -118,7 +118,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
         if rows == len(handles) or box.width < MAX_FILL * figure.bbox.width:
             break
         legend.remove()
-    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - ROWS / rows) * box.height / figure.dpi)
+    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - LEGEND_ROWS / rows) * box.height / figure.dpi)
 
 
 def settle(figure: Figure) -> None:
@@ -145,7 +145,7 @@ def break_lines(figure: Figure) -> None:
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 
-OF_PIXELS = ("png", "tiff")
+RASTER_KINDS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
@@ -161,7 +161,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
     file = io.BytesIO()
     # By default, matplotlib makes ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, dpi=dpi if kind in OF_PIXELS else PNG_DPI, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi if kind in RASTER_KINDS else PNG_DPI, **undated[kind])
     return file.getvalue()
 
 

@@ -45,7 +45,9 @@ NEED: Final = Need(CONTINUATION_STAGE, "branches", ("model", "period", "from", "
 MODEL_COLOURS: Final = {"rigid": BLUE, "contact": ORANGE}
 BIFURCATION_MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
-FROM_FLIP: Final = 16  # points plotted between a flip and the first gait computed on the branch that starts there
+POINTS_FROM_FLIP: Final = (
+    16  # points plotted between a flip and the first gait computed on the branch that starts there
+)
 OTHER_GAITS: Final = GREEN
 """Colour of gaits outside the period-doubling cascade of the one-step gait."""
 
@@ -149,7 +151,7 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
     quantity = curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
-    root = np.linspace(0.0, 1.0, FROM_FLIP, endpoint=False)
+    root = np.linspace(0.0, 1.0, POINTS_FROM_FLIP, endpoint=False)
     parting = quantity[0] + root[:, None] * (quantity[1] - quantity[0])
     first = value[0] + root**2 * (value[1] - value[0])
     return np.concatenate([first, value[1:]]), np.concatenate([parting, quantity[1:]])
@@ -161,7 +163,7 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 
 
 ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
-ROOM: Final = 0.06
+MARGIN: Final = 0.06
 """Margin around the stable gaits, relative to their span. Unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
 """Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
@@ -251,7 +253,7 @@ def closer_view(results: Results) -> tuple[float, float] | None:
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least = min(values)
     most = max(*ends, max(values))
-    room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
+    room = max(MARGIN * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     close = max(least - room, summary["from"]), min(most + room, summary["to"])
     return close if close[1] - close[0] < MAX_DETAIL_FRACTION * (summary["to"] - summary["from"]) else None
 
@@ -270,7 +272,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
     least = MIN_PANEL_SPAN * float(np.abs(values).max())
-    room = max(ROOM * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
+    room = max(MARGIN * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - room, float(values.max()) + room
 
 
@@ -298,7 +300,7 @@ GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMI
 """Colours of each model's one-step gaits, in the order in which they were found. `DASHES` has their line styles."""
 DASHES: Final = ("-", "--", "-.", ":")
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
-FARTHEST: Final = 1.6
+PLANE_HALF_WIDTH: Final = 1.6
 """Half-width of the visible part of the complex plane. Multipliers of unstable gaits may lie far outside."""
 
 
@@ -323,11 +325,11 @@ def draw_multipliers(results: Results) -> Drawn:
         key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", **look))
         largest = max(largest, float(np.abs(multipliers).max()))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
-    left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
+    left.set(xlim=(-PLANE_HALF_WIDTH, PLANE_HALF_WIDTH), ylim=(-PLANE_HALF_WIDTH, PLANE_HALF_WIDTH), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
     right.set(xlabel=parameter_of(results), ylabel="magnitude", title="(b) over the parameter")
-    right.set_ylim(0.0, 2.0 * FARTHEST)
+    right.set_ylim(0.0, 2.0 * PLANE_HALF_WIDTH)
     end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
@@ -335,7 +337,7 @@ def draw_multipliers(results: Results) -> Drawn:
         if item["period"] == shortest:
             found.setdefault((item["model"], item["kind"]), []).append(item["value"])
     bifurcations = {which: sorted(values) for which, values in found.items()}
-    return figure, (bifurcations, largest if largest > FARTHEST else None)
+    return figure, (bifurcations, largest if largest > PLANE_HALF_WIDTH else None)
 
 
 CURVES_NEED: Final = Need(
@@ -344,7 +346,7 @@ CURVES_NEED: Final = Need(
 CURVE_COLOURS: Final = {"rigid": BLACK, "contact": ORANGE}
 CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0, 1.5))}
 WIDTHS: Final = {1: 1.4, 2: 1.0}
-FINEST: Final = 0.6
+MIN_CURVE_WIDTH: Final = 0.6
 DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#1F5488"}
 OTHER_PERIOD, APERIODIC, NO_WALKING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
@@ -364,7 +366,9 @@ def draw_plane(results: Results) -> Drawn:
     for curve in branches_of(results, "curve"):
         kind = str(curve.group.attrs["kind"])
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
-        axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
+        axes.plot(
+            curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, MIN_CURVE_WIDTH)
+        )
         second = curve.group.variables["second"]
         axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
     axes.set_xlabel(parameter_of(results))

@@ -24,7 +24,9 @@ MEASURED: Final = "measured_"
 LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
 PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
-LEADING: Final = 0.1  # a parameter is named if its change is at least this fraction of the combination's largest
+MIN_NAMED_FRACTION: Final = (
+    0.1  # a parameter is named if its change is at least this fraction of the combination's largest
+)
 
 
 def quantities(steps: Group) -> list[str]:
@@ -138,7 +140,7 @@ def describe_combination(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
     largest = max(sizes, key=abs)
     parts = []
     for row, size in zip(rows, sizes, strict=True):
-        if abs(size) >= LEADING * abs(largest):
+        if abs(size) >= MIN_NAMED_FRACTION * abs(largest):
             amount, unit = (100.0 * abs(size), "%") if row["value"] else (abs(size), row["unit"])
             text = np.format_float_positional(amount, 2, fractional=False, trim="-")
             sign = "+" if size * largest > 0.0 else "−"

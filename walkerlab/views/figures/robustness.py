@@ -14,7 +14,14 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, read_sticks
+from walkerlab.views.figures.stick_diagram import (
+    BOLD_WIDTH,
+    FAINT_WIDTH,
+    draw_postures,
+    draw_slope,
+    frame_view,
+    read_sticks,
+)
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
@@ -41,7 +48,7 @@ ACTUATIONS: Final = {
 }
 """Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
-MOST_ROWS: Final = 4
+MAX_ROWS: Final = 4
 """Maximum number of rows of a table at one point: two models, each with two legs."""
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
@@ -92,7 +99,7 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
     """Return the values (points,) of a model for each of its rows in a table. Legs that differ have a row each."""
     rows = []
-    for row in range(MOST_ROWS):
+    for row in range(MAX_ROWS):
         if name.format(row) in group.variables:
             owned = group[f"{name.partition('.')[0]}.{row}.model"] == model
             rows += [np.where(owned, group[name.format(row)].astype(float), np.nan)] if owned.any() else []
@@ -148,7 +155,7 @@ def plot_rough_ground(results: Results) -> Drawn:
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
     strikes = strikes[strikes < sticks.time.size]
     draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT_WIDTH)
-    draw_postures(walk, sticks, strikes, FULL)
+    draw_postures(walk, sticks, strikes, BOLD_WIDTH)
     draw_slope(walk, sticks)
     heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=GREY)
     heights.axhline(0.0, color=BLACK, linewidth=0.7)

@@ -40,7 +40,7 @@ POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
 FAINT_WIDTH = 0.8
 """Line width (pt) of legs between heel strikes."""
-FULL = 2.2
+BOLD_WIDTH = 2.2
 """Line width (pt) of legs at heel strikes."""
 HEADROOM = 0.19
 """Free space above the walker (leg lengths)."""
@@ -60,7 +60,7 @@ SIDE_INCHES = 0.7
 """Room (in) for axis labels at the side."""
 ROOM_ABOVE = 1.05
 """Room (in) for the legend."""
-SHAPE = 0.68
+MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
 NO_STEPS = Group(
     {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
@@ -87,7 +87,7 @@ class Sticks:
     def pushing(self, time: float) -> int | None:
         """Return the leg whose push-off is shown at a time (s), or None if no push-off is shown."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
-        late = step < 0 or time - self.strikes[step] > SEEN_S
+        late = step < 0 or time - self.strikes[step] > PUSH_SHOWN_S
         return None if late or not self.pushes else 1 - step % 2
 
     @property
@@ -195,7 +195,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
     left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
-    widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
+    widen = max(0.0, 0.5 * ((top - bottom) / MAX_ASPECT - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(0.0)
     across = figure.get_figwidth() - SIDE_INCHES
@@ -205,7 +205,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
     draw_postures(axes, sticks, between, FAINT_WIDTH)
-    draw_postures(axes, sticks, at_strikes, FULL)
+    draw_postures(axes, sticks, at_strikes, BOLD_WIDTH)
     shown = slice(0, int(rows.max()) + 1)
     axes.plot(*sticks.project(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
     annotate(axes, sticks, sticks.top[shown])
@@ -271,7 +271,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 def entries(sticks: Sticks) -> list[Artist]:
     """Return the legend entries of the legs, the hip and any torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
-    strike = entry("at heel strike", color=GREY, linewidth=FULL)
+    strike = entry("at heel strike", color=GREY, linewidth=BOLD_WIDTH)
     between = entry("between", color=GREY, linewidth=FAINT_WIDTH)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
     torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
@@ -332,7 +332,7 @@ FIGURE_2, FIGURE_6 = (
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
-SEEN_S = 0.08
+PUSH_SHOWN_S = 0.08
 """Time for which an animation shows a push-off (s)."""
 PUSH_SHARE = 0.3
 """Length of the mark of a push-off relative to the leg."""
@@ -341,7 +341,7 @@ FILM_SIZE = (6.4, 3.6)
 FILM_DPI = 100
 """Resolution of a frame (pixels per inch)."""
 STEPS_SHOWN = 4
-RELIEF = 0.04
+RELIEF_HEIGHT = 0.04
 """Maximum height of the magnified ground profile (leg lengths)."""
 RELIEF_DEPTH = 0.075
 """Distance of the magnified ground profile below the ground (leg lengths)."""
@@ -370,7 +370,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     """Draw the ground profile again below the ground, magnified until visible, and print the factor."""
     if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[:, 1]).max())):
         return
-    room = RELIEF * sticks.leg_length / roughest
+    room = RELIEF_HEIGHT * sticks.leg_length / roughest
     ten = 10.0 ** math.floor(math.log10(room))
     times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
     if times <= 1.0:

@@ -50,7 +50,7 @@ ERROR_TEXTS = {
 """Text and unit of each quantity that has a numerical error."""
 
 
-MUCH_SMALLER = 0.01
+MAX_LAST_ERROR_RATIO = 0.01
 """The answer also gives the error of the last step if it is less than this fraction of the largest one."""
 
 
@@ -62,7 +62,7 @@ def describe_error(error: Mapping[str, Any]) -> str:
         f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERROR_TEXTS.items() if key in error
     )
     last = [steps[-1] for name, steps in error.get("of_steps", {}).items() if name == "step_period_s"]
-    if last and last[0] < MUCH_SMALLER * error["step_period_s"]:
+    if last and last[0] < MAX_LAST_ERROR_RATIO * error["step_period_s"]:
         text += f" (in the period of the last step {quantity(last[0], 's', 1)})"
     return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"
 

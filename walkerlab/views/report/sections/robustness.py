@@ -8,7 +8,7 @@ from walkerlab.views.report.numbers import format_integer, length, number
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
-WORSE = 0.01
+MIN_DECLINE = 0.01
 """Relative change above which a measure of robustness counts as worse."""
 FIRST_TABLES = 2
 """Number of tables that the terminal shows by default."""
@@ -81,7 +81,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 def is_worse(row: Mapping[str, Any]) -> bool:
     """Whether a gait is less robust at the optimum than at the start: it survives less, or is more sensitive."""
     change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
-    return (change if row["quantity"].startswith("largest") else -change) < -WORSE
+    return (change if row["quantity"].startswith("largest") else -change) < -MIN_DECLINE
 
 
 @stage_section("robustness", "gaits")
