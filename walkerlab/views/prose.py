@@ -20,7 +20,7 @@ BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
 
 def parts(text: str) -> list[str]:
     """Split a text at its | marks, dropping empty parts."""
-    return [said for part in BETWEEN_PARTS.split(text) if (said := part.strip(" \n"))]
+    return [stripped for part in BETWEEN_PARTS.split(text) if (stripped := part.strip(" \n"))]
 
 
 def f(value: float, spec: str) -> str:
@@ -45,10 +45,11 @@ class Prose:
         # Imported here: commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # pages escape it later
-        made.filters |= {function.__name__: function for function in self.filters}
-        made.globals |= self.known
-        return made
+        # Texts are not escaped here: terminals show them as they are, and pages escape them later.
+        environment = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)
+        environment.filters |= {function.__name__: function for function in self.filters}
+        environment.globals |= self.known
+        return environment
 
     def __call__(self, name: str, *values: Any) -> str:
         """Render a paragraph on one line.
@@ -57,8 +58,8 @@ class Prose:
         values  arguments of the macro
         """
         file, _, macro = name.partition(".")
-        said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
-        return BLANKS.sub(" ", said).strip()
+        rendered = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
+        return BLANKS.sub(" ", rendered).strip()
 
     def parts(self, name: str, *values: Any) -> list[str]:
         """Render a text, and split it at its | marks, dropping empty parts. The arguments are those of a call."""

@@ -187,8 +187,8 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     short = [caption_name(block.caption) for block in tables]
     unique = [name not in TABLES and short.count(name) == 1 for name in short]
     return {
-        name if alone else hyphenate(block.caption): block
-        for name, alone, block in zip(short, unique, tables, strict=True)
+        name if is_unique else hyphenate(block.caption): block
+        for name, is_unique, block in zip(short, unique, tables, strict=True)
     }
 
 
@@ -314,12 +314,12 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
         # Imported here: CSV needs no HDF5.
         from walkerlab.pipeline.store import hdf5
 
-        about = {
+        attributes = {
             "title": f"walkerlab {stored.identity.stage}",
             "Conventions": hdf5.CONVENTIONS,
             "content_digest": stored.digest(),
         }
-        return hdf5.image({"": group}, {**group.attrs, **about})
+        return hdf5.image({"": group}, {**group.attrs, **attributes})
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims == ("time",):

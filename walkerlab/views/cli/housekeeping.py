@@ -77,8 +77,8 @@ def list_extensions(request: Request) -> None:
     rows = []
     lines = []
     for each in registry():
-        said = {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.reason}
-        rows.append(said)
+        row = {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.reason}
+        rows.append(row)
         added = [f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if names and kind != "views"]
         lines.append(f"{each.name} ({each.origin}): {f'left out, {each.reason}' if each.reason else '; '.join(added)}")
     print_result(request, {"extensions": rows}, lines)

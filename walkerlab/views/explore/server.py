@@ -83,8 +83,8 @@ class Job:
         of_config = [*question.options, "--runs", str(runs), "--json"]
         try:
             if kind == "report":
-                made = self._command("report", *of_config)
-                file = Path(made["run_dir"]) / made["html"]
+                answer = self._command("report", *of_config)
+                file = Path(answer["run_dir"]) / answer["html"]
             else:
                 walk = "simulate" if question.models == ["rigid"] else "contact-sim"
                 folder = Path(self._command(walk, *of_config)["run_dir"])

@@ -59,11 +59,11 @@ def overlay(results: Results) -> Player | None:
     """Animate the measured walk over the identified one, or return None if no angles were measured."""
     motions = {style: results.group("identify", f"{name}_motion") for name, style in OVERLAY_STYLES.items()}
     tracks = {style: track for style, motion in motions.items() if (track := track_in(motion)) is not None}
-    about = motions["rigid"]
-    if about is None or not tracks:
+    identified_motion = motions["rigid"]
+    if identified_motion is None or not tracks:
         return None
-    slope, leg, radius = (float(about.attrs[name]) for name in ("slope_rad", "leg_m", "foot_radius_m"))
-    strikes = about["time"][1:][np.diff(about["step"]) > 0].round(6).tolist()
+    slope, leg, radius = (float(identified_motion.attrs[name]) for name in ("slope_rad", "leg_m", "foot_radius_m"))
+    strikes = identified_motion["time"][1:][np.diff(identified_motion["step"]) > 0].round(6).tolist()
     walkers = [
         Walker(f"{name.capitalize()} walk", style, tracks[style], tuple(strikes), stills(tracks[style], strikes))
         for name, style in OVERLAY_STYLES.items()
