@@ -95,7 +95,7 @@ class Request:
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     graph: Graph = PIPELINE  # the stages of the program
-    full: bool = switch("--full", help="Also run the long campaign; an interrupted one resumes the next time.")
+    full: bool = switch("--full", help="Also run the long campaign. An interrupted one resumes the next time.")
     config: str | None = option(
         "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
         help="Config file, built-in config, or run by its name or folder; default: paper.",
@@ -112,7 +112,7 @@ class Request:
         "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
     force: bool = switch("--force", help="Recompute the stage and all it needs, even if up to date.")
-    dry_run: bool = switch("--dry-run", help="Show what would be done and why; change nothing.")
+    dry_run: bool = switch("--dry-run", help="Show what would be done and why, but change nothing.")
     no_wait: bool = switch("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
     open_page: bool = switch("--open", help="Show the page in the browser as soon as it exists.")
     every: bool = switch("--all", help="Show all values, not only the headline values.")

@@ -1,4 +1,4 @@
-"""Answers computed in a worker: summaries of stages, and motions to draw."""
+"""Answers to the page's requests, computed in a worker: summaries of stages, and motions to draw."""
 
 import json
 import math
