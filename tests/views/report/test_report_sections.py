@@ -150,7 +150,7 @@ def test_title_and_verdict_of_a_driven_walker_name_its_drive_and_cost():
     found = sections(sets=driven, **costly)
     cost = "its cost of transport is 0.00998 in the rigid gait and 0.0195 on compliant ground"
     assert f"The walker is {by}; {cost}." in plain(found["verdict"].blocks[0].text)
-    assert "arrows show the ground forces and the push-off" in texts(found["motion"])
+    assert "Arrows show the ground forces and the push-off" in texts(found["motion"])
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
