@@ -2,7 +2,7 @@ const TAU = 2 * Math.PI;
 const UNITS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
 const minus = (text) => text.replace("-", "−");
 const digits = (value, count = 4) => (value === undefined ? "–" : minus(Math.abs(value) < 1e-12 ? "0" : Number(value.toPrecision(count)).toString()));
-// Lengths below a nanometre are rounding errors.
+// Lengths below a nanometre are rounding errors and shown as zero.
 const metres = (value, count = 3) => {
   const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? [Infinity, "m"];
   return `${digits(value / scale, count)} ${unit}`;
