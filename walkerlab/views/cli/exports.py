@@ -349,10 +349,12 @@ MAX_GIF_RATE = 50
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
     """Return `model`. If it is None, choose contact-sim, or simulate if only that has run.
 
-    Raises ConfigError if `model` does not walk.
+    Raises ConfigError if the stage `model` simulates no walk.
     """
     if model is not None and model not in MODEL_NAMES:
-        raise ConfigError(f"--model {model} is not a stage that walks.", f"Choose from {', '.join(MODEL_NAMES)}.")
+        raise ConfigError(
+            f"--model {model} is not a stage that simulates a walk.", f"Choose from {', '.join(MODEL_NAMES)}."
+        )
     rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)

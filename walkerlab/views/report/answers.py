@@ -207,7 +207,7 @@ def tune(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import adjustment
 
     gait = summary["gait"]
-    missing = "" if gait["found"] else f"No own gait: {gait['reason']}."
+    missing = "" if gait["found"] else f"The contact model has no gait of its own: {gait['reason']}."
     gait_table = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
     sentences = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
     return [*sentences, gait_table, adjustment.margins_table(summary)]
