@@ -20,7 +20,7 @@ BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
 
 def parts(text: str) -> list[str]:
     """Split a text at its | marks, dropping empty parts."""
-    return [said for part in BETWEEN_PARTS.split(text) if (said := part.strip(" \n"))]
+    return [stripped for part in BETWEEN_PARTS.split(text) if (stripped := part.strip(" \n"))]
 
 
 def f(value: float, spec: str) -> str:
@@ -37,7 +37,7 @@ class Prose:
     """Renders paragraphs from a folder of templates as plain text."""
 
     folder: Path
-    filters: Sequence[Callable[..., Any]]  # functions that templates may call by name; an unknown name is an error
+    filters: Sequence[Callable[..., Any]]  # functions that templates may use as filters
     known: Mapping[str, Any]  # global variables of the templates
 
     @cached_property
@@ -45,10 +45,11 @@ class Prose:
         # Imported here: commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # pages escape it later
-        made.filters |= {function.__name__: function for function in self.filters}
-        made.globals |= self.known
-        return made
+        # Texts are not escaped here: terminals show them as they are, and pages escape them later.
+        environment = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)
+        environment.filters |= {function.__name__: function for function in self.filters}
+        environment.globals |= self.known
+        return environment
 
     def __call__(self, name: str, *values: Any) -> str:
         """Render a paragraph on one line.
@@ -57,13 +58,13 @@ class Prose:
         values  arguments of the macro
         """
         file, _, macro = name.partition(".")
-        said = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
-        return BLANKS.sub(" ", said).strip()
+        rendered = getattr(self.templates.get_template(f"{file}.j2").module, macro)(*values)
+        return BLANKS.sub(" ", rendered).strip()
 
     def parts(self, name: str, *values: Any) -> list[str]:
-        """Split a text at its | marks, dropping empty parts."""
+        """Render a text, and split it at its | marks, dropping empty parts. The arguments are those of a call."""
         return parts(self(name, *values))
 
     def terms(self, name: str, *values: Any) -> dict[str, str]:
-        """Return the words and meanings in a macro whose parts have the form 'word: meaning'."""
+        """Return the meaning of each word in a macro whose parts have the form 'word: meaning'."""
         return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

@@ -229,7 +229,7 @@ def test_gif_lasts_as_long_as_its_pictures_at_their_rate(rate):
 
 
 def test_gif_that_browsers_slow_down_is_rejected(run):
-    with pytest.raises(ConfigError, match="browsers slow a GIF above 50 frames per second"):
+    with pytest.raises(ConfigError, match="browsers slow down GIFs with more than 50 frames per second"):
         write_film(run, Target("gif", None), Film("simulate", 1, 60, 1.0), QUIET)
 
 

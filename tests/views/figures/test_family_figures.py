@@ -116,7 +116,7 @@ def test_multipliers_beyond_the_axes_are_mentioned():
     assert "outside the axes" not in FIGURE_14.render(results).caption
     branch["multiplier_real"].flags.writeable = True
     branch["multiplier_real"][-1] = -7.25
-    assert "Some multipliers lie outside the axes; the largest magnitude is 7.25." in FIGURE_14.render(results).caption
+    assert "Some multipliers lie outside the axes. The largest magnitude is 7.25." in FIGURE_14.render(results).caption
 
 
 def test_step_periods_split_at_a_flip_like_a_square_root():

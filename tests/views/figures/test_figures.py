@@ -112,12 +112,12 @@ def test_models_without_a_common_step_have_no_phase_difference():
 
 def test_figures_of_the_paper_are_named_by_its_numbers():
     assert [figure.name for figure in PAPER_FIGURES] == [f"figure-{figure.number:02d}" for figure in PAPER_FIGURES]
-    assert PAPER_FIGURES[0].called == "figure 2"
+    assert PAPER_FIGURES[0].reference == "figure 2"
     assert len(set(NAMES)) == len(NAMES)
 
 
 def test_figures_not_in_the_paper_are_called_by_name():
-    assert Illustration("run-time", (), dict.popitem).called == "figure run-time"
+    assert Illustration("run-time", (), dict.popitem).reference == "figure run-time"
 
 
 def test_every_figure_has_a_text_and_every_text_a_figure():

@@ -7,7 +7,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.maps import is_logarithmic
-from walkerlab.views.figures.sweep import choose, illustration, lines, maps, one_over_another
+from walkerlab.views.figures.sweep import choose, illustration, lines, maps, plot_against
 from walkerlab.views.report.sweep_page import check_options
 
 PARAMETERS = ("slope_deg", "hip_mass_kg")
@@ -100,7 +100,7 @@ def test_quantity_can_be_plotted_over_another():
         "speed_m_s": Variable(speed, ("x",), "m/s", "speed"), "cost_of_transport": Variable(cost, ("x",), "1", "cost"),
     })  # fmt: skip
     with figure_style():
-        axes = one_over_another(group, ["cost_of_transport"], "speed_m_s").axes[0]
+        axes = plot_against(group, ["cost_of_transport"], "speed_m_s").axes[0]
     (curve,) = axes.lines
     np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (m/s)", "cost of transport")

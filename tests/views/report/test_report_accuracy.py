@@ -147,7 +147,7 @@ def test_exhausted_budget_is_explained():
     assert costs.groups["contact"][-1][-1].text == "budget exhausted at 10⁻⁸"
     assert "Each run is limited to 200,000 right-hand sides" in costs.note
     assert "dop853 exhausts this budget at tight tolerances" in costs.note
-    assert "a library’s to 20,000" in costs.note
+    assert "runs of a library to 20,000" in costs.note
 
 
 def test_skipped_runs_are_grouped_by_reason(made):

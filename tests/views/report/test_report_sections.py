@@ -37,7 +37,7 @@ from walkerlab.views.report.blocks import (
     Shares,
     Statements,
 )
-from walkerlab.views.report.gaits import SETS, coordinate, every_gait, works
+from walkerlab.views.report.gaits import SETS, coordinate, tabulate_gaits, work_columns
 from walkerlab.views.report.registry import SECTIONS, lead, sections_of
 from walkerlab.views.report.sections import motion
 from walkerlab.views.report.sections.walks import assumptions
@@ -150,7 +150,7 @@ def test_title_and_verdict_of_a_driven_walker_name_its_drive_and_cost():
     found = sections(sets=driven, **costly)
     cost = "its cost of transport is 0.00998 in the rigid gait and 0.0195 on compliant ground"
     assert f"The walker is {by}; {cost}." in plain(found["verdict"].blocks[0].text)
-    assert "arrows show the ground forces and the push-off" in texts(found["motion"])
+    assert "Arrows show the ground forces and the push-off" in texts(found["motion"])
     assert "Cost of transport" in texts(found["glossary"])
     assert by in plain(lead(config(*driven), "level"))
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
@@ -166,7 +166,7 @@ def test_spring_alone_is_not_a_drive():
 
 def test_energy_columns_that_are_zero_to_rounding_are_omitted():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
-    told = [column.title for column in works(str) if column.value(record) is not None]
+    told = [column.title for column in work_columns(str) if column.value(record) is not None]
     assert told == ["work of the push-off per step (J)"]
 
 
@@ -486,10 +486,10 @@ def test_gaits_have_no_heading_with_one_set_of_equations():
     gait = gait_summary() | {"chosen": True, "objection": ""}
     every = {name: [gait, gait | {"chosen": False, "objection": "it scuffs"}] for name in SETS}
     heads = [
-        [*every_gait({name: every[name] for name in sets}, COORDINATES).groups] for sets in (["corrected"], [*SETS])
+        [*tabulate_gaits({name: every[name] for name in sets}, COORDINATES).groups] for sets in (["corrected"], [*SETS])
     ]
     assert heads == [[""], ["as printed", "corrected"]]
-    assert [row[-1].text for row in next(iter(every_gait(every, COORDINATES).groups.values()))] == [
+    assert [row[-1].text for row in next(iter(tabulate_gaits(every, COORDINATES).groups.values()))] == [
         "chosen",
         "it scuffs",
     ]

@@ -13,7 +13,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.artifact import broken_file, indexed_files
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 from walkerlab.views.report import stage as report
-from walkerlab.views.report.page import fitting
+from walkerlab.views.report.page import choose_images
 from walkerlab.views.report.stage import write_pages
 
 SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>
@@ -187,6 +187,6 @@ def test_largest_drawings_become_pixel_images_if_the_page_is_too_large(tmp_path)
         svg.write_bytes(b"x" * size)
         png.write_bytes(b"x" * 50)
         drawings.append((svg, png))
-    assert [path.name for path in fitting(drawings, most=10_000)] == ["a.svg", "b.svg", "c.svg"]
-    assert [path.name for path in fitting(drawings, most=500)] == ["a.svg", "b.png", "c.svg"]
-    assert [path.name for path in fitting(drawings, most=200)] == ["a.svg", "b.png", "c.png"]
+    assert [path.name for path in choose_images(drawings, most=10_000)] == ["a.svg", "b.svg", "c.svg"]
+    assert [path.name for path in choose_images(drawings, most=500)] == ["a.svg", "b.png", "c.svg"]
+    assert [path.name for path in choose_images(drawings, most=200)] == ["a.svg", "b.png", "c.png"]

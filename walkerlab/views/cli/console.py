@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.table import Table
 
-QUIET_LINE_S = 8.0
+MAX_SILENCE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
-ENOUGH_DONE = 0.1
-"""Minimum fraction of done parts for a prediction of the remaining time. The first parts are not typical."""
-ENOUGH_S = 3.0
+MIN_DONE_FRACTION = 0.1
+"""Minimum fraction of done parts for a prediction of the remaining time, because the first parts are not typical."""
+MIN_COMPUTED_S = 3.0
 """Minimum computing time (s) for a prediction of the remaining time."""
 
 
@@ -117,7 +117,7 @@ class Console:
     def _talk(self, end: threading.Event) -> None:
         """Report the running stages whenever nothing has been printed for a while."""
         while not end.wait(0.5):
-            if time.monotonic() - self._said_at >= QUIET_LINE_S:
+            if time.monotonic() - self._said_at >= MAX_SILENCE_S:
                 self._say("; ".join(line.describe() for line in self._lines()))
 
     def _lines(self) -> Iterator[StageLine]:
@@ -196,7 +196,7 @@ class StageLine:
         None if both are unknown.
         """
         computed = time.monotonic() - self.work_began
-        if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
+        if self.total and self.done >= MIN_DONE_FRACTION * self.total and computed >= MIN_COMPUTED_S:
             # The first parts also load and compile code, so only the later half counts.
             half = bisect.bisect_left(self.progress, (self.done // 2,))
             done, start = self.progress[half - 1] if half else (0, 0.0)

@@ -48,13 +48,15 @@ class Target:
     output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
     columns: int = 1  # journal columns that a figure or a table for LaTeX spans
-    width: float | None = None  # width (pt) of a figure; None for that of the columns
+    width: float | None = None  # width (pt) of a figure; None for the width of `columns`
     dpi: int = EXPORT_DPI  # pixels per inch of a figure
 
     def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """Return file and format (default: first of `kinds`).
+        """Return the file to write and its format, by default the first of `kinds`.
 
-        Raises ConfigError for an unknown format or a protected file.
+        what  the exported item, for messages
+        stem  name of the file without its ending, if the user gave none
+        Raises ConfigError for an unknown format, or if the file must not be overwritten.
         """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
@@ -104,7 +106,7 @@ TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "t
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY = "trajectory"
 STEPS = "steps"
-STORED_WITH = "Run it with outputs: [states, energies, forces]."
+OUTPUTS_ADVICE = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
@@ -185,15 +187,15 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     short = [caption_name(block.caption) for block in tables]
     unique = [name not in TABLES and short.count(name) == 1 for name in short]
     return {
-        name if alone else hyphenate(block.caption): block
-        for name, alone, block in zip(short, unique, tables, strict=True)
+        name if is_unique else hyphenate(block.caption): block
+        for name, is_unique, block in zip(short, unique, tables, strict=True)
     }
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     """Find a figure or table by name.
 
-    Raises ConfigError, which lists the items of the run, for an unknown name.
+    Raises ConfigError for an unknown name. Its advice lists the items of the run.
     """
     # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.stage import FIGURES
@@ -213,7 +215,8 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
-    near = "" if name.startswith("figure-") else suggestion(name, names)  # numbers of figures are not misspelt
+    # The figure with the most similar number is not what a user meant.
+    near = "" if name.startswith("figure-") else suggestion(name, names)
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
@@ -227,7 +230,7 @@ def plan_run(folder: RunFolder) -> Planner:
 
 
 def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
-    """Draw a figure as on the page, with the target's size.
+    """Draw a figure as on the page, but at the target's size, and return the file's bytes.
 
     Raises StaleError if its results are missing.
     """
@@ -300,23 +303,23 @@ def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
     """Return a walk over time as CSV (a column per variable and leg) or netCDF.
 
-    Raises StaleError if none is stored.
+    Raises StaleError if no trajectory is stored.
     """
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
     if group is None:
-        raise StaleError("the walk was stored without a trajectory.", STORED_WITH)
+        raise StaleError("the walk was stored without a trajectory.", OUTPUTS_ADVICE)
     if kind == "nc":
         # Imported here: CSV needs no HDF5.
         from walkerlab.pipeline.store import hdf5
 
-        about = {
+        attributes = {
             "title": f"walkerlab {stored.identity.stage}",
             "Conventions": hdf5.CONVENTIONS,
             "content_digest": stored.digest(),
         }
-        return hdf5.image({"": group}, {**group.attrs, **about})
+        return hdf5.image({"": group}, {**group.attrs, **attributes})
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims == ("time",):
@@ -338,18 +341,20 @@ class Film:
 
 
 BOTH = "both"
-"""Name of a film that shows both models in one picture."""
+"""Value of `Film.model` that shows both models in one picture."""
 MAX_GIF_RATE = 50
-"""Browsers show a picture of less than 20 ms for 100 ms."""
+"""Maximum frame rate (frames per second). Browsers show a frame shorter than 20 ms for 100 ms."""
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
     """Return `model`. If it is None, choose contact-sim, or simulate if only that has run.
 
-    Raises ConfigError if `model` does not walk.
+    Raises ConfigError if the stage `model` simulates no walk.
     """
     if model is not None and model not in MODEL_NAMES:
-        raise ConfigError(f"--model {model} is not a stage that walks.", f"Choose from {', '.join(MODEL_NAMES)}.")
+        raise ConfigError(
+            f"--model {model} is not a stage that simulates a walk.", f"Choose from {', '.join(MODEL_NAMES)}."
+        )
     rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)
@@ -365,8 +370,9 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     if kind == "gif" and film.rate > MAX_GIF_RATE:
-        raise ConfigError(f"browsers slow a GIF above {MAX_GIF_RATE} frames per second.", "Lower --rate, or use .mp4.")
-    # Imported here: a file that cannot be written is refused before drawing code is loaded.
+        message = f"browsers slow down GIFs with more than {MAX_GIF_RATE} frames per second."
+        raise ConfigError(message, "Lower --rate, or use .mp4.")
+    # Imported here: if the file cannot be written, the user should not have to wait for the drawing code.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
     rigid, contact = MODEL_NAMES
@@ -376,7 +382,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
         for model in (shown, *behind):
             reason = FILM_NEEDS[model].missing_in(results, {})
             if reason is not None:
-                raise StaleError(f"the walk cannot be drawn: {reason}.", STORED_WITH)
+                raise StaleError(f"the walk cannot be drawn: {reason}.", OUTPUTS_ADVICE)
         sticks = read_sticks(walk)
         other = read_sticks(others[0]) if others else None
         times = film_times(sticks, film.steps, film.rate, film.slower)
@@ -398,7 +404,8 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
-    # A GIF counts hundredths of a second. Rounded ends of pictures keep the whole film in time.
+    # A GIF counts hundredths of a second. The frames' ends are rounded, because rounded durations would add up to an
+    # error of the whole film.
     durations_ms = 10 * np.diff(np.round(100 * np.arange(len(frames) + 1) / rate)).astype(int)
     file = io.BytesIO()
     frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=durations_ms.tolist(), loop=0)
@@ -413,8 +420,8 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
-    # Many players show only yuv420p. ffmpeg cannot go back in a pipe to write the index of the file, so it writes
-    # fragments.
+    # Many players show only yuv420p. The fragments are needed because ffmpeg writes to a pipe, in which it cannot go
+    # back to write the index of an ordinary MP4.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

@@ -12,7 +12,7 @@ import typer
 
 from walkerlab.extensions import registry
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, exit_on_failure, print_result
+from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Request, exit_on_failure, print_result
 
 if TYPE_CHECKING:
     from walkerlab.pipeline.headlines import Pair, RunDifference
@@ -77,8 +77,8 @@ def list_extensions(request: Request) -> None:
     rows = []
     lines = []
     for each in registry():
-        said = {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.reason}
-        rows.append(said)
+        row = {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.reason}
+        rows.append(row)
         added = [f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if names and kind != "views"]
         lines.append(f"{each.name} ({each.origin}): {f'left out, {each.reason}' if each.reason else '; '.join(added)}")
     print_result(request, {"extensions": rows}, lines)
@@ -211,10 +211,10 @@ def percent(pair: Pair) -> str:
 
 
 COMMANDS = (
-    Offer(status, (*OF_A_RUN, *OUTPUT_FIELDS)),
-    Offer(show, (*OF_A_RUN, *OUTPUT_FIELDS)),
+    Offer(status, (*RUN_OPTIONS, *OUTPUT_FIELDS)),
+    Offer(show, (*RUN_OPTIONS, *OUTPUT_FIELDS)),
     Offer(diff, ("runs", "every", "as_json")),
     Offer(schema, ("as_json",)),
     Offer(list_extensions, ("as_json",), name="extensions"),
-    Offer(clean, (*OF_A_RUN, "dry_run", "no_wait", *OUTPUT_FIELDS)),
+    Offer(clean, (*RUN_OPTIONS, "dry_run", "no_wait", *OUTPUT_FIELDS)),
 )

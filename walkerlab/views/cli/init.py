@@ -35,7 +35,8 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
-    """Write a walker's commented config and schema, or with `checks` a short one with a printed gait to fill in.
+    """Write a walker's commented config and the schema. With `checks`, the config is short and has a printed gait to
+    fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """

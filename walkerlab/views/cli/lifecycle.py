@@ -27,7 +27,7 @@ def init(
     request: Request,
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="[FILE]", help="The config to write; it must not exist. Default: my-TYPE.yaml."),
+        typer.Argument(metavar="[FILE]", help="The config to write, which must not exist yet. Default: my-TYPE.yaml."),
     ] = None,
     walker: Annotated[
         str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
@@ -97,7 +97,9 @@ def export(
     model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Model of the trajectory; {FIRST_WALK}.")] = None,
     law: Annotated[
         str | None,
-        typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
+        typer.Option(
+            metavar="LAW", help="Contact law in ADAMS: contact (ADAMS's, the default) or functions (exactly ours)."
+        ),
     ] = None,
     slope: Annotated[
         str | None,
@@ -168,12 +170,12 @@ def animate(
     request: Request,
     run: RunArgument,
     to: Annotated[
-        str | None, typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name.")
+        str | None, typer.Option("--to", metavar="FORMAT", help="gif, mp4 (needs ffmpeg), or a file name.")
     ] = None,
     output: Output = None,
     model: Annotated[
         str | None,
-        typer.Option(metavar="STAGE|both", help=f"Model of the walk; both: both models in one picture; {FIRST_WALK}."),
+        typer.Option(metavar="STAGE|both", help=f"Model of the walk, or both for both in one picture; {FIRST_WALK}."),
     ] = None,
     steps: Annotated[
         int | None,

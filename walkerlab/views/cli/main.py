@@ -17,25 +17,25 @@ from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import STRIDES, Stage
 from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, add_command
+from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Request, add_command
 
 
 def main() -> None:
     """Run the program with this process's arguments, and exit with its code."""
-    # Loaded modules stay until the command ends; searching them for garbage repeatedly would take longer than finding a
+    # Loaded modules stay until the command ends. Searching them for garbage repeatedly would take longer than finding a
     # gait with compiled code.
     gc.set_threshold(300_000, 50, 100)
-    # All matrices are small; threads that share one would spend more time waiting than computing.
+    # All matrices are small. Threads that share one would spend more time waiting than computing.
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    # At its end Python collects garbage once more. Frozen objects are left out.
+    # Python collects garbage once more when it ends. Frozen objects are left out, so this takes no time.
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
     def format_warning(
         message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None
     ) -> str:
-        # Imported here: help must not load the compiler; when a cache warning appears, the compiler is loaded already.
+        # Imported here, because help must not load the compiler. A cache warning appears only after that is loaded.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning
@@ -65,7 +65,7 @@ GROUPS = {
     ),
     "Keep house": ("status", "show", "schema", "extensions", "rerun", "compile", "clean"),
 }  # fmt: skip
-"""Commands by purpose, in the order of the help; a command that is in no group is listed with the last one."""
+"""Commands by purpose, in the order of the help. Commands that are in no group are listed in the last one."""
 
 
 class Commands(TyperGroup):
@@ -135,7 +135,7 @@ def print_version(verbose: bool) -> None:
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of a stage to a program, with the options that apply to it."""
-    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OUTPUT_FIELDS]
+    shared = [*RUN_OPTIONS, "jobs", "force", "dry_run", "no_wait", *OUTPUT_FIELDS]
     if STRIDES not in stage.options:
         shared.remove("strides")
     shared += ["open_page"] if stage is graph.stages[-1] else []

@@ -18,11 +18,14 @@ from walkerlab.views.cli.request import Request
 def write_model(
     run: str, request: Request, target: Target, law: str | None = None, slope: str = "gravity"
 ) -> list[Path]:
-    """Write a model of a run's or config's walker, computing its gait first if necessary, and return the files written.
+    """Write a model of the walker of a run or config, and return the files written. A missing gait is computed first.
 
+    run    run or config
+    law    contact law in a model for ADAMS; None for its default
     slope  what is tilted in a model for MuJoCo: gravity, or the geometry
 
-    Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
+    Raises ConfigError for an unknown run or format, or if a format cannot express the walker, and NoAnswer if the
+    walker has no gait.
     """
     resolved = resolve(run, request.settings, runs=request.runs)
     console = request.console

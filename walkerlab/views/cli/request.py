@@ -27,6 +27,7 @@ from walkerlab.pipeline.plan.stage import Option
 from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.console import Console
 
+# Imported for types only: help must load neither the config nor NumPy.
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
@@ -34,10 +35,8 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.store.runs import RunFolder
 
 
-# Imported for types only: help must load neither the config nor NumPy.
-
 RUNS = Path("runs")
-OF_KIND = re.compile(r"\([^)]*\)")
+BLOCK_KIND = re.compile(r"\([^)]*\)")
 """Pattern for the kind of a block in a key, as in `walker(kneed)`."""
 
 
@@ -46,7 +45,7 @@ def keys_to_set(incomplete: str) -> list[str]:
     # Imported here and below: only shell completion needs the lists.
     from walkerlab.config.reference import keys
 
-    of_kinds = (OF_KIND.sub("", row.key) for row in keys() if row.key != "extends")
+    of_kinds = (BLOCK_KIND.sub("", row.key) for row in keys() if row.key != "extends")
     return [f"{key}=" for key in dict.fromkeys(of_kinds) if key.startswith(incomplete)]
 
 
@@ -96,7 +95,7 @@ class Request:
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     graph: Graph = PIPELINE  # the stages of the program
-    full: bool = switch("--full", help="Also run the long campaign; an interrupted one resumes the next time.")
+    full: bool = switch("--full", help="Also run the long campaign. An interrupted one resumes the next time.")
     config: str | None = option(
         "--config", "-c", metavar="FILE", autocompletion=configs_and_files,
         help="Config file, built-in config, or run by its name or folder; default: paper.",
@@ -113,7 +112,7 @@ class Request:
         "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
     force: bool = switch("--force", help="Recompute the stage and all it needs, even if up to date.")
-    dry_run: bool = switch("--dry-run", help="Show what would be done and why; change nothing.")
+    dry_run: bool = switch("--dry-run", help="Show what would be done and why, but change nothing.")
     no_wait: bool = switch("--no-wait", help="Give up (exit 6) if another process works in the run folder.")
     open_page: bool = switch("--open", help="Show the page in the browser as soon as it exists.")
     every: bool = switch("--all", help="Show all values, not only the headline values.")
@@ -131,10 +130,10 @@ class Request:
         return (*(self.sets or ()), *self.own)
 
     def typed_for(self, command: str) -> str:
-        """Return the options, each preceded by a space, with which a command works on this run.
+        """Return the options with which `command` works on this run, each preceded by a space.
 
-        This command repeats its own options; other stages get only those that they read, as settings, and all other
-        commands get all of them. Every command gets the settings by --set.
+        If it is the command of this request, the options of its stage are repeated as typed. For other commands they
+        become --set options, but a stage gets only those that it reads.
         """
         from walkerlab.config.reads import keys_of
 
@@ -194,7 +193,7 @@ class Request:
         return self.resolved_run.folder
 
 
-OF_A_RUN = ("config", "sets", "strides", "name", "runs")
+RUN_OPTIONS = ("config", "sets", "strides", "name", "runs")
 """Options that select the run."""
 OUTPUT_FIELDS = ("as_json", "quiet", "verbose")
 """Options for the form and amount of output."""
@@ -236,7 +235,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         if error.errno == errno.ENAMETOOLONG:
             too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
             raise fail(too_long) from None
-        # An error without a file name is one of the output.
+        # An OSError without a file name comes from writing the output.
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()
@@ -281,9 +280,6 @@ def print_json(value: dict[str, Any]) -> None:
     print(json.dumps(value, indent=2, allow_nan=False))
 
 
-# Imported for types only: help must load neither the config nor NumPy.
-
-
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
     """Convert a field declared by `option` to a parameter of the signature that typer reads."""
     kind = inspect.Parameter.KEYWORD_ONLY
@@ -292,8 +288,7 @@ def as_parameter(entry: Field[Any]) -> inspect.Parameter:
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
-    """Convert a stage's own options to settings. `values` holds the value of each option by flag, or None if the user
-    gave none.
+    """Convert a stage's own options to settings. `values` has the value of each option by flag, None if not given.
 
     Raises typer.BadParameter for malformed bounds, and for an option given without the options that it needs.
     """

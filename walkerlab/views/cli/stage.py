@@ -18,7 +18,7 @@ DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 def run_stage(request: Request, stage: Stage) -> None:
     """Run a stage and print its result.
 
-    Raises typer.Exit(4) without an answer, and the errors of `run_and_write`.
+    Raises typer.Exit(4) if there is no answer, and the errors of `run_and_write`.
     """
     try:
         report_on(request, stage)
@@ -27,7 +27,7 @@ def run_stage(request: Request, stage: Stage) -> None:
 
 
 def report_on(request: Request, stage: Stage) -> None:
-    """Run a stage as requested and print its result. A ConfigError does not give the position in the config file."""
+    """Run a stage as requested and print its result. Its ConfigErrors lack the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     reporter = None if options.dry else request.console
     report = run_and_write(request.resolved_run, stage.name, options, reporter, request.graph)

@@ -33,7 +33,7 @@ from walkerlab.views.cli.request import Request, print_result
 from walkerlab.views.report.tables import aligned, describe_summary
 
 DIGEST_CHARACTERS = 12
-"""Number of a digest's characters shown in text output."""
+"""Number of characters of a digest that text output shows."""
 NOT_CURRENT = ("stale", "missing", "damaged")
 
 
@@ -41,8 +41,8 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
     """Print the state of each stage, and of all runs unless one was selected.
 
     run  name or folder of a run, compared with the config stored in its results; None for the request's run
-    Raises ConfigError for an unknown run, StaleError if its config is unreadable; with `check`, typer.Exit(5) for a
-    stale, missing or damaged result.
+    Raises ConfigError for an unknown run, and StaleError if its config is unreadable. With `check`, raises
+    typer.Exit(5) for a stale, missing or damaged result.
     """
     folder = request.folder if run is None else run_named(run, request.runs)
     config = request.resolved if run is None else config_of(folder)
@@ -127,9 +127,9 @@ def check_error(steps: tuple[Step, ...], last: str) -> StaleError | None:
 
 
 def print_stored(request: Request, stage: str) -> None:
-    """Print a stage's artifact, current or not.
+    """Print a stage's artifact, even if it is out of date.
 
-    Raises StaleError if it cannot be read.
+    Raises ConfigError if there is no run, StaleError if the artifact cannot be read.
     """
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, request.graph) if step.stage.name == stage)
@@ -195,10 +195,11 @@ def row(name: str, variable: Variable) -> list[str]:
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete the stages' files of one run or, with `every`, of all runs, after confirmation, and remove emptied
-    folders.
+    """Delete the stages' files of one run or, with `every`, of all runs, and remove folders that become empty.
 
-    Raises typer.BadParameter if there is no terminal to ask on, LockedError (with `--no-wait`) and StorageError.
+    The user has to confirm this unless `yes` is set.
+    Raises typer.BadParameter if there is no terminal for the question, StorageError if a file cannot be removed, and,
+    with `--no-wait`, LockedError while another process works in a folder.
     """
     if every:
         names = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
@@ -239,9 +240,9 @@ def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
 
 
 def rerun_artifact(path: Path, request: Request) -> None:
-    """Recompute an artifact in an empty folder.
+    """Recompute an artifact in an empty folder, and print whether the result is the same.
 
-    Raises ConfigError if missing, StaleError if damaged or not reproduced.
+    Raises ConfigError if the artifact is missing, StaleError if it is damaged or not reproduced.
     """
     try:
         stored = read(path)
@@ -255,9 +256,9 @@ def rerun_artifact(path: Path, request: Request) -> None:
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
         report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph)
-        again = None if report.artifact is None else read(report.artifact)
-    before, after = stored.digest(), None if again is None else again.digest()
-    same_code = again is not None and again.identity.key == stored.identity.key
+        recomputed = None if report.artifact is None else read(report.artifact)
+    before, after = stored.digest(), None if recomputed is None else recomputed.digest()
+    same_code = recomputed is not None and recomputed.identity.key == stored.identity.key
     value = {
         "stage": stage,
         "artifact": str(path),

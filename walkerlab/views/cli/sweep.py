@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, option, print_result, switch
+from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Request, option, print_result, switch
 from walkerlab.views.report.tables import paragraph
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SUMMARY_KEYS = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
 """Keys of a sweep's summary that `--json` prints."""
-LISTED_POINTS = 20
+MAX_LISTED_POINTS = 20
 """Maximum number of points that a dry run lists."""
 
 
@@ -95,7 +95,7 @@ def sweep(request: SweepRequest) -> None:
     )
     if request.dry_run:
         foreseen = SweepRun(question, loaded, request.folder, request.graph)
-        show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
+        show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, MAX_LISTED_POINTS))
         return
     with chosen.start_early(engine_options) as engine:
         run = SweepRun(question, loaded, request.folder, request.graph)
@@ -195,5 +195,7 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
 
 
 COMMANDS = (
-    Offer(sweep, (*SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest),
+    Offer(
+        sweep, (*SWEEP_FIELDS, *RUN_OPTIONS, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest
+    ),
 )

@@ -83,8 +83,8 @@ class Job:
         of_config = [*question.options, "--runs", str(runs), "--json"]
         try:
             if kind == "report":
-                made = self._command("report", *of_config)
-                file = Path(made["run_dir"]) / made["html"]
+                answer = self._command("report", *of_config)
+                file = Path(answer["run_dir"]) / answer["html"]
             else:
                 walk = "simulate" if question.models == ["rigid"] else "contact-sim"
                 folder = Path(self._command(walk, *of_config)["run_dir"])
@@ -128,19 +128,21 @@ class Job:
 
 
 TEMPLATES = Path(__file__).parent / "templates"
-SEEN = (
+PLAYER_CAPTION = (
     "Wide outline: rigid model; narrow: contact model. Each leg is a line from hip to foot;"
     " leg 2 is hollow. Arrows are ground forces; a red arrow is a push-off."
 )
 
 
-LONGEST_NAME = 60
+MAX_NAME_CHARACTERS = 60
 
 
 def start_name(base: ExploredConfig) -> str:
     name = base.called or base.config or DEFAULT
     changed = f"{name} with {', '.join(base.sets)}"
-    return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+    return (
+        name if base.called or not base.sets else changed if len(changed) <= MAX_NAME_CHARACTERS else f"{name}, changed"
+    )
 
 
 def choices(base: ExploredConfig) -> list[str]:
@@ -162,7 +164,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         # An empty player, which the script fills.
         block=Player(
             title="The walk.",
-            caption=SEEN,
+            caption=PLAYER_CAPTION,
             alt="The walker",
             walkers=(),
             slope_rad=0.0,
@@ -171,7 +173,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
             closeup_m=1.0,
             view=(0, 0, 1, 1),
         ),
-        # Markup only for the package's own files; all other texts are escaped.
+        # Only the package's own files are markup. All other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),
     )
@@ -180,7 +182,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
 
 
 LONGEST_BODY = 100_000
-NICE = 15
+NICENESS = 15
 
 
 def failure(status: int, message: str, advice: str = "") -> Answered:
@@ -201,7 +203,7 @@ class Desk:
     def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
         if self.drops:  # background work yields to other processes
-            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
+            os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICENESS)
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
@@ -212,7 +214,7 @@ class Desk:
         with self._count:
             self._newest += 1
             number = self._newest
-        # The worker is busy with an earlier request, which nobody waits for any more.
+        # The worker is busy with an earlier request, for which nobody waits any more.
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
@@ -399,7 +401,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def check_token(self, token: str) -> bool:
         """Check the token, and answer with status 401 if it is wrong. Return whether it is right."""
-        # The time of an ordinary comparison tells how many characters are right.
+        # An ordinary comparison takes longer the more characters are right, which would help to guess the token.
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))

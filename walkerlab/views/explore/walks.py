@@ -1,4 +1,4 @@
-"""Answers computed in a worker: summaries of stages, and motions to draw."""
+"""Answers to the page's requests, computed in a worker: summaries of stages, and motions to draw."""
 
 import json
 import math
@@ -28,26 +28,26 @@ from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections import motion
 
-FIRST: Final = (
+INITIAL_KEYS: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
 """Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
-DRIVES: Final = ("walker.hip.", "push_off.")
-"""Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
+DRIVE_BLOCKS: Final = ("walker.hip.", "push_off.")
+"""Blocks of which only non-zero keys are shown before any search."""
 HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
 )  # fmt: skip
 """Keys that do not affect a walk."""
-AROUND: Final = 5.0
+SLIDER_FACTOR: Final = 5.0
 """Factor between a slider's initial value and either end of its range."""
-FAR_AROUND: Final = 100.0
+WIDE_SLIDER_FACTOR: Final = 100.0
 """Factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
-DECADES: Final = 100.0
+MIN_LOGARITHMIC_RATIO: Final = 100.0
 """Ratio of bounds above which a slider is logarithmic."""
-HALVINGS: Final = 10
+BISECTIONS: Final = 10
 """Number of bisections to find the last valid value of a slider."""
 
 
@@ -70,20 +70,26 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
         if value is not None:
             unit, meaning = described(config, key)
             shown = {"key": key, "value": value, "start": first, "unit": unit, "meaning": meaning}
-            turned = reach(key, first, unit, field, start)
+            turned = input_of(key, first, unit, field, start)
             yield shown | {"rank": rank(key, first) if turned else None, "bounds": bounds_of(field)} | turned
 
 
 def rank(key: str, first: Any) -> int | None:
-    """Return a key's position among those shown initially, or None if it appears in searches only."""
-    if (key.startswith(DRIVES) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
+    """Return the position of a key among those shown before any search, or None if it appears in searches only."""
+    if (key.startswith(DRIVE_BLOCKS) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
-    places = (index for index, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
+    places = (
+        index for index, name in enumerate(INITIAL_KEYS) if key == name or (name[-1] == "." and key.startswith(name))
+    )
     return next(places, None)
 
 
-def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
-    """Return the choices or the slider range of a key, or neither if its value must be typed."""
+def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
+    """Return the choices or the slider range of a key, or nothing if its value must be typed.
+
+    first  value before any change
+    start  config before any change
+    """
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
@@ -101,9 +107,9 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         least = 0.0 if low >= 0.0 else -ordinary
         most = ordinary
     else:
-        by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
+        by = WIDE_SLIDER_FACTOR if any(part in key for part in BY_MAGNITUDE) else SLIDER_FACTOR
         least, most = sorted((first / by, first * by))
-        logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
+        logarithmic = first > 0.0 and low >= 0.0 and high > MIN_LOGARITHMIC_RATIO * low
         # A slider that starts close to zero must reach the typical size.
         most = max(most, ordinary) if logarithmic else most
     # The slope's bounds are in radians, unlike its slider.
@@ -144,12 +150,12 @@ def gaits_by(key: str, start: Config) -> Parameter | None:
 
 
 def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
-    """Return the valid value closest to a slider's end, with the config's other values kept."""
+    """Return the value closest to a slider's end that is valid together with the config's other values."""
     if parameter.config_at(start, end) is not None:
         return end
     good = first
     bad = end
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (good + bad)
         good, bad = (good, middle) if parameter.config_at(start, middle) is None else (middle, bad)
     return good
@@ -159,7 +165,7 @@ WALK_STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
-MOST_STEPS_SHOWN = 100
+MAX_STEPS_SHOWN = 100
 """Maximum number of steps shown, enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
 """Signal that makes a worker abandon its request."""
@@ -191,7 +197,7 @@ class GivingWay(Silent):
 
 @dataclass(frozen=True)
 class ExploredConfig:
-    """A config with changes."""
+    """A config with the changes made on the page."""
 
     config: str | None  # value of `--config`
     sets: tuple[str, ...]  # values of `--set`
@@ -241,7 +247,7 @@ def memory() -> MemoryResults:
 
 
 def walk(question: ExploredConfig) -> Answered:
-    """Compute the gait and the walks, with the data that the player needs."""
+    """Compute the gait and the walks of a config, and the data with which the player shows them."""
     try:
         loaded = question.loaded
         config = loaded.config
@@ -262,7 +268,7 @@ def walk(question: ExploredConfig) -> Answered:
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage]
-    if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
+    if (player := motion.player(Results(config, walks), MAX_STEPS_SHOWN)) is not None:
         answer["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
         answer["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
@@ -292,11 +298,11 @@ def follow_gaits(question: ExploredConfig) -> Answered:
         return SUPERSEDED
     # Attractors are skipped: they have step periods but are not branches.
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
-    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
+    curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if is_walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 
 
-def walkable(branch: Group) -> bool:
+def is_walkable(branch: Group) -> bool:
     """Whether a branch has a gait in which the ground never has to pull."""
     forces = branch.variables.get("min_normal_force_N")
     return forces is None or bool((forces.values > 0.0).any())
@@ -319,7 +325,7 @@ def config_text(question: ExploredConfig, name: str) -> str:
 
     If the starting point has another type of walker, the whole config is written.
 
-    Raises ConfigError if invalid.
+    Raises ConfigError if the config is invalid.
     """
     start = config_to_extend(question.config)
     named = replace(question, changes={**question.changes, "name": name})

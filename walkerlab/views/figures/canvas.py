@@ -25,15 +25,15 @@ from walkerlab.views.figures.style import FIGURE_WIDTH, NARROW, NARROW_BELOW, PN
 
 MAX_FILL = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
-ROWS = 3
-"""Legend rows that fit in a figure's nominal height; longer legends make the figure taller."""
+LEGEND_ROWS = 3
+"""Number of legend rows that fit in a figure's nominal height. Longer legends make the figure taller."""
 HEIGHT_EXPONENT = 0.7
-"""Height of a figure is proportional to its width raised to this power. It is below 1 because text hardly shrinks."""
+"""A figure's height is proportional to its width raised to this power. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Multiples of powers of ten that are labelled on an axis, after the largest ratio of its limits that they suit."""
+"""Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
-MAX_MINOR_SPAN: Final = 1e4
+MAX_PLAIN_NUMBER: Final = 1e4
 """Largest number written without an exponent."""
 
 
@@ -79,7 +79,7 @@ def label_of(words: str, unit: str) -> str:
 def label_ticks(axis: Axis) -> None:
     """Label as many decades of a logarithmic axis as fit, and values between them if the axis spans few."""
     least, last = axis.get_view_interval()
-    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, MAX_MINOR_SPAN)), ())
+    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, MAX_PLAIN_NUMBER)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))
@@ -118,7 +118,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
         if rows == len(handles) or box.width < MAX_FILL * figure.bbox.width:
             break
         legend.remove()
-    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - ROWS / rows) * box.height / figure.dpi)
+    figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - LEGEND_ROWS / rows) * box.height / figure.dpi)
 
 
 def settle(figure: Figure) -> None:
@@ -145,7 +145,7 @@ def break_lines(figure: Figure) -> None:
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 
-OF_PIXELS = ("png", "tiff")
+RASTER_KINDS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
@@ -161,7 +161,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
     file = io.BytesIO()
     # By default, matplotlib makes ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, dpi=dpi if kind in OF_PIXELS else PNG_DPI, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi if kind in RASTER_KINDS else PNG_DPI, **undated[kind])
     return file.getvalue()
 
 

@@ -45,7 +45,9 @@ NEED: Final = Need(CONTINUATION_STAGE, "branches", ("model", "period", "from", "
 MODEL_COLOURS: Final = {"rigid": BLUE, "contact": ORANGE}
 BIFURCATION_MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
-FROM_FLIP: Final = 16  # points plotted between a flip and the first gait computed on the branch that starts there
+POINTS_FROM_FLIP: Final = (
+    16  # points plotted between a flip and the first gait computed on the branch that starts there
+)
 OTHER_GAITS: Final = GREEN
 """Colour of gaits outside the period-doubling cascade of the one-step gait."""
 
@@ -73,7 +75,7 @@ class DrawnBranch:
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
-    """Yield the groups called `name` (branch or curve) of each model, in the order in which they were followed."""
+    """Yield the branches or curves (`name`) of each model, in the order in which they were followed."""
     groups = results[CONTINUATION_STAGE].groups
     for model in MODEL_COLOURS:
         for number in count():
@@ -119,8 +121,9 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations, and return the kinds of the
-    bifurcations.
+    """Plot a quantity of every step along a branch, and the bifurcations, and return the kinds of the bifurcations.
+
+    Lines are solid where gaits are stable, otherwise dashed.
     """
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
@@ -142,12 +145,13 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the parameter values and quantities to plot between two points of a branch, given by index."""
-    # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance.
+    # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance. A
+    # straight line to the first computed gait would show a sharp corner.
     value = curve.value[begin : end + 1]
     quantity = curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
-    root = np.linspace(0.0, 1.0, FROM_FLIP, endpoint=False)
+    root = np.linspace(0.0, 1.0, POINTS_FROM_FLIP, endpoint=False)
     parting = quantity[0] + root[:, None] * (quantity[1] - quantity[0])
     first = value[0] + root**2 * (value[1] - value[0])
     return np.concatenate([first, value[1:]]), np.concatenate([parting, quantity[1:]])
@@ -159,15 +163,15 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 
 
 ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
-ROOM: Final = 0.06
-"""Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
+MARGIN: Final = 0.06
+"""Margin around the stable gaits, relative to their span. Unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
 """Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
 """
-TOLD_APART: Final = 0.04
+MIN_LABEL_DISTANCE: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
-CLOSER: Final = 0.8
-"""Fraction of the full range below which the range around the bifurcations is shown in panels of its own."""
+MAX_DETAIL_FRACTION: Final = 0.8
+"""The bifurcations get panels of their own if their range is less than this fraction of the full range."""
 POINTS_BETWEEN: Final = 16
 """Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
 
@@ -216,8 +220,8 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait of fewest
-    steps is listed.
+    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait with the
+    fewest steps is listed.
     """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
@@ -225,14 +229,14 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
     ]
     births: list[tuple[float, int]] = []
     for period, value in sorted(folds):
-        apart = all(abs(value - other) > TOLD_APART * (shown[1] - shown[0]) for other, _ in births)
+        apart = all(abs(value - other) > MIN_LABEL_DISTANCE * (shown[1] - shown[0]) for other, _ in births)
         if shown[0] <= value <= shown[1] and apart:
             births.append((value, period))
     return sorted(births)
 
 
 def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
-    """Label gaits born in folds above the axes, since some of their windows are as thin as a line."""
+    """Label gaits born in folds above the axes, because they may be stable only in windows as narrow as a line."""
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
@@ -240,7 +244,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def closer_view(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor, or None if that is no closer view."""
+    """Return the parameter range around the bifurcations and any attractor, or None if it is nearly the full range."""
     summary = results[CONTINUATION_STAGE].summary
     values = [item["value"] for item in summary["bifurcations"]]
     if not values:
@@ -249,9 +253,9 @@ def closer_view(results: Results) -> tuple[float, float] | None:
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least = min(values)
     most = max(*ends, max(values))
-    room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
+    room = max(MARGIN * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     close = max(least - room, summary["from"]), min(most + room, summary["to"])
-    return close if close[1] - close[0] < CLOSER * (summary["to"] - summary["from"]) else None
+    return close if close[1] - close[0] < MAX_DETAIL_FRACTION * (summary["to"] - summary["from"]) else None
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
@@ -268,7 +272,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
     least = MIN_PANEL_SPAN * float(np.abs(values).max())
-    room = max(ROOM * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
+    room = max(MARGIN * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - room, float(values.max()) + room
 
 
@@ -293,11 +297,11 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
 
 
 GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMILLION, GREY)}
-"""Colours of each model's one-step gaits, in the order in which they were found; line styles are those of `DASHES`."""
+"""Colours of each model's one-step gaits, in the order in which they were found. `DASHES` has their line styles."""
 DASHES: Final = ("-", "--", "-.", ":")
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
-FARTHEST: Final = 1.6
-"""Half-width of the visible part of the complex plane; multipliers of unstable gaits may lie far outside."""
+PLANE_HALF_WIDTH: Final = 1.6
+"""Half-width of the visible part of the complex plane. Multipliers of unstable gaits may lie far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:
@@ -321,11 +325,11 @@ def draw_multipliers(results: Results) -> Drawn:
         key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", **look))
         largest = max(largest, float(np.abs(multipliers).max()))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
-    left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
+    left.set(xlim=(-PLANE_HALF_WIDTH, PLANE_HALF_WIDTH), ylim=(-PLANE_HALF_WIDTH, PLANE_HALF_WIDTH), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
     right.set(xlabel=parameter_of(results), ylabel="magnitude", title="(b) over the parameter")
-    right.set_ylim(0.0, 2.0 * FARTHEST)
+    right.set_ylim(0.0, 2.0 * PLANE_HALF_WIDTH)
     end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
@@ -333,7 +337,7 @@ def draw_multipliers(results: Results) -> Drawn:
         if item["period"] == shortest:
             found.setdefault((item["model"], item["kind"]), []).append(item["value"])
     bifurcations = {which: sorted(values) for which, values in found.items()}
-    return figure, (bifurcations, largest if largest > FARTHEST else None)
+    return figure, (bifurcations, largest if largest > PLANE_HALF_WIDTH else None)
 
 
 CURVES_NEED: Final = Need(
@@ -342,7 +346,7 @@ CURVES_NEED: Final = Need(
 CURVE_COLOURS: Final = {"rigid": BLACK, "contact": ORANGE}
 CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0, 1.5))}
 WIDTHS: Final = {1: 1.4, 2: 1.0}
-FINEST: Final = 0.6
+MIN_CURVE_WIDTH: Final = 0.6
 DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#1F5488"}
 OTHER_PERIOD, APERIODIC, NO_WALKING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
@@ -362,7 +366,9 @@ def draw_plane(results: Results) -> Drawn:
     for curve in branches_of(results, "curve"):
         kind = str(curve.group.attrs["kind"])
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
-        axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, FINEST))
+        axes.plot(
+            curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, MIN_CURVE_WIDTH)
+        )
         second = curve.group.variables["second"]
         axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
     axes.set_xlabel(parameter_of(results))

@@ -23,7 +23,7 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
 SHOWN_STRIDES = 2
-"""Number of strides in the force figure, few enough to tell impacts apart."""
+"""Number of strides in the force figure. With more, single impacts could not be told apart."""
 SHOWN_STEPS = 40
 """Number of steps in the loss figure."""
 SHOWN_LOADS: Final = 0.99
@@ -40,7 +40,7 @@ def draw_forces(results: Results) -> Drawn:
     every = whole[NORMAL_FORCE]
     loads = walk[NORMAL_FORCE]
     pulls = walk[FRICTION]
-    # upper limit of the normal-force axis (N)
+    # Upper limit of the normal-force axis (N).
     top = 1.1 * float(np.quantile(loads[loads > 0.0], SHOWN_LOADS)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
@@ -49,7 +49,7 @@ def draw_forces(results: Results) -> Drawn:
     cone = parts["cone"]
     key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
     steepest = 0.0
-    # draw no cone if there is no friction
+    # Without friction there is no cone.
     for name, style in (("static", "-"), ("dynamic", "--")) if result[TRAJECTORY][FRICTION].any() else ():
         coefficient = float(result.identity.config_slice["contact"][f"{name}_friction"])
         bound: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": style}
@@ -65,7 +65,7 @@ def draw_forces(results: Results) -> Drawn:
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
-    # Without friction the axis still needs two different ends.
+    # Without friction, the axis would begin and end at zero.
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
     of_normal = walk.label("normal force", NORMAL_FORCE)
@@ -86,8 +86,8 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost in each step by cause (label, colour). The rest is attributed to the knees."""
-    # The last sample before each touchdown is taken, so that an impact counts entirely towards the step that it starts.
+    """Return the energy (J) lost in each step by cause (label, colour). The knees get what no other cause explains."""
+    # Steps are divided at the last sample before a touchdown, so that an impact counts entirely for the step it starts.
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
     supplied = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
@@ -99,7 +99,7 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """Plot a stacked bar per step. The caption gives the mean loss (J) by cause, leaving out the first step."""
+    """Plot a stacked bar for each step. The caption gives the mean loss (J) by cause, without the first step."""
     by_cause = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(by_cause.values())).size))

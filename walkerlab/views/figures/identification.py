@@ -24,7 +24,9 @@ MEASURED: Final = "measured_"
 LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
 PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
-LEADING: Final = 0.1  # a parameter is named if its change is at least this fraction of the combination's largest
+MIN_NAMED_FRACTION: Final = (
+    0.1  # a parameter is named if its change is at least this fraction of the combination's largest
+)
 
 
 def quantities(steps: Group) -> list[str]:
@@ -125,7 +127,10 @@ def draw_trade_off(results: Results) -> Drawn:
 
 
 def semi_axis_of_region(freedom: float) -> float:
-    """Return the semi-axis (standard errors) of a 95 % region of two parameters: sqrt(2 F), F(2, `freedom`) at 95 %."""
+    """Return the semi-axis (standard errors) of a 95 % region of two parameters.
+
+    It is sqrt(2 F), where F is the 95 % quantile of the F distribution with 2 and `freedom` degrees of freedom.
+    """
     return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 
@@ -135,7 +140,7 @@ def describe_combination(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
     largest = max(sizes, key=abs)
     parts = []
     for row, size in zip(rows, sizes, strict=True):
-        if abs(size) >= LEADING * abs(largest):
+        if abs(size) >= MIN_NAMED_FRACTION * abs(largest):
             amount, unit = (100.0 * abs(size), "%") if row["value"] else (abs(size), row["unit"])
             text = np.format_float_positional(amount, 2, fractional=False, trim="-")
             sign = "+" if size * largest > 0.0 else "−"

@@ -23,7 +23,7 @@ Draw = Callable[[Results], Drawn]
 
 @dataclass(frozen=True)
 class Need:
-    """Variables that a figure needs from a stage's result, and optionally a scene whose reference it needs."""
+    """Variables that a figure needs from the result of a stage, and optionally the scene whose reference it needs."""
 
     stage: str
     group: str
@@ -32,8 +32,9 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return the reason why the requirement is not met, or None if it is met. `absent` holds the reason for each
-        missing result, by stage.
+        """Return the reason why the requirement is not met, or None if it is met.
+
+        absent  why each missing result is missing, by stage
         """
         if self.stage not in results:
             reason = absent.get(self.stage)
@@ -77,12 +78,13 @@ class Illustration:
         return tuple(dict.fromkeys(need.stage for need in self.needs))
 
     @property
-    def called(self) -> str:
+    def reference(self) -> str:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return the reason why the illustration cannot be drawn, or None if it can. `absent` holds the reason for each
-        missing result, by stage.
+        """Return the reason why the illustration cannot be drawn, or None if it can.
+
+        absent  why each missing result is missing, by stage
         """
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)
@@ -100,7 +102,7 @@ class Illustration:
         return Drawing(svg, png, self.say("caption", *caption_values))
 
     def figure(self, results: Results) -> Figure:
-        """Draw the figure for a notebook or a script, laid out."""
+        """Draw the figure and lay it out, for a notebook or a script."""
         with figure_style():
             figure, _ = self.draw(results)
             settle(figure)

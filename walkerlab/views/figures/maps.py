@@ -46,7 +46,7 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
     return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in kinds]
 
 
-def ends_among(outcomes: Any) -> list[tuple[str, str]]:
+def outcome_kinds(outcomes: Any) -> list[tuple[str, str]]:
     """Return colour and label of each outcome that occurs in a map."""
     return [(OUTCOME_TEXTS[item].colour, item.label) for item in map(Outcome, np.unique(outcomes).tolist())]
 
@@ -112,7 +112,7 @@ def draw_starts(results: Results) -> Drawn:
             axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
-    key = patches(ends_among([cells[f"{model}outcome"] for model, _ in TUNED_MODELS]))
+    key = patches(outcome_kinds([cells[f"{model}outcome"] for model, _ in TUNED_MODELS]))
     for label, marker, size, face, (x, y) in marks:
         mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
         for axes in both:
@@ -258,7 +258,7 @@ def draw_stiction(results: Results) -> Drawn:
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)
     maps.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
-    seen = [*ends_among(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
+    seen = [*outcome_kinds(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
     mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
     for axes in (maps.left, maps.right):
         axes.plot(*PAPER, **mark, markersize=5.0)

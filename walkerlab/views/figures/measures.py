@@ -20,10 +20,10 @@ Point = tuple[float, float]
 
 FIGURE_HEIGHT = 4.6
 """Nominal height of the figure (in)."""
-SMALL = 7.5
+LABEL_SIZE = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Dimensions up to this length (leg lengths) have a label but no arrow, and soles no mark at their centre."""
+"""Up to this length (leg lengths), a dimension gets a label but no arrow, and a sole no mark at its centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
@@ -35,14 +35,14 @@ LEFT_OF_LEG = 0.62
 """Distance (leg lengths) between the leg and the labels behind it."""
 FIRST_LANE = 0.24
 """Distance (leg lengths) between the leg and the first dimension line ahead of it."""
-LETTER = 0.0088
+CHARACTER_WIDTH = 0.0088
 """Width of a character as a fraction of the picture's width."""
 LINE_SPACING = 0.0195
 """Height of a line of text as a fraction of the picture's width."""
-CLEAR = 0.05
+MIN_LABEL_DISTANCE = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
 TITLE = 0.4
-"""Height (in) that the title of a panel takes."""
+"""Height of the title of a panel (in)."""
 PARTS_ROOM = 1.5
 """Height of a body's panel relative to the body."""
 
@@ -159,13 +159,13 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     for index, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
         draw_panel(axes, leg, legs[-1 - index], view)
         if titles:
-            axes.set_title(f"leg {index + 1}", fontsize=SMALL)
+            axes.set_title(f"leg {index + 1}", fontsize=LABEL_SIZE)
     return figure
 
 
 @dataclass(frozen=True)
 class View:
-    """Part of the plane (m) around a leg that shows all its labels, and where they are."""
+    """Part of the plane (m) that shows a leg with all its labels, and the positions of the labels."""
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
     heights: list[float]  # height of each of these labels
@@ -183,9 +183,9 @@ def frame_leg(leg: UprightLeg) -> View:
     # Text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length.
     behind = letters([words for words, *_ in labels])
     ahead = [letters([dimension.label for dimension in lane]) for lane in lanes]
-    width = (LEFT_OF_LEG + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
+    width = (LEFT_OF_LEG + FIRST_LANE) * length / (1.0 - CHARACTER_WIDTH * (behind + sum(ahead)))
     width = max(width, (leg.top + 0.3 * length) * FIGURE_WIDTH / FIGURE_HEIGHT)
-    left = -LEFT_OF_LEG * length - LETTER * behind * width
+    left = -LEFT_OF_LEG * length - CHARACTER_WIDTH * behind * width
     sizes = [LINE_SPACING * width * len(words.split("\n")) for words, *_ in labels]
     heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
     top = max(leg.top, *heights) + 0.1 * length
@@ -203,8 +203,8 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     axes.plot(ends, [0.0, 0.0], color=BLACK, linewidth=0.8)
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
-    axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
-    # the other leg, behind and off the ground, with its knee bent if it has one
+    axes.text(0.28 * length, y, "walking direction", va="center", fontsize=LABEL_SIZE)
+    # The other leg is behind and off the ground. If it has a knee, the knee is bent.
     second = [leg.joints[0]]
     angles = (SECOND_LEG_ANGLE, BENT_ANGLE)[: len(other.joints)]
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
@@ -215,15 +215,17 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     x = FIRST_LANE * length
     for lane, wide in zip(view.lanes, view.ahead, strict=True):
         for dimension in lane:
-            draw_length(axes, dimension, x, LETTER * view.width)
-        x += LETTER * wide * view.width
+            draw_length(axes, dimension, x, CHARACTER_WIDTH * view.width)
+        x += CHARACTER_WIDTH * wide * view.width
     axes.plot(*np.transpose([spot for _, spot in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
     for dimension in leg.lengths:
         if dimension.start[1] == dimension.end[1]:
             axes.plot(*np.transpose([dimension.start, dimension.end]), color=VERMILLION, linewidth=1.5)
     for (words, colour, spot), height in zip(view.labels, view.heights, strict=True):
         axes.plot([-LEFT_OF_LEG * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
-        axes.text(-LEFT_OF_LEG * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
+        axes.text(
+            -LEFT_OF_LEG * length, height, f"{words} ", color=colour, fontsize=LABEL_SIZE, ha="right", va="center"
+        )
     if leg.radius > SMALL_ARC * length:
         axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
 
@@ -237,7 +239,7 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
         level = dimension.start[1] == dimension.end[1]
         if level or dimension.value <= SMALL_ARC * length:
             labels.append((dimension.label, VERMILLION if level else BLUE, dimension.end))
-        elif free := [lane for lane in lanes if all(clear(dimension, second, length) for second in lane)]:
+        elif free := [lane for lane in lanes if all(fit_in_lane(dimension, second, length) for second in lane)]:
             free[0].append(dimension)
         else:
             lanes.append([dimension])
@@ -249,11 +251,11 @@ def letters(texts: Sequence[str]) -> int:
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
-def clear(dimension: Length, second: Length, length: float) -> bool:
+def fit_in_lane(dimension: Length, second: Length, length: float) -> bool:
     """Whether two dimensions in one lane, and their labels, do not overlap."""
     between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
     # Slightly less than half of both, so that dimensions may meet end to end.
-    return between > max(0.499 * (dimension.value + second.value), CLEAR * length)
+    return between > max(0.499 * (dimension.value + second.value), MIN_LABEL_DISTANCE * length)
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
@@ -293,7 +295,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
     high = measure.start[1]
     low = measure.end[1]
     axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
-    axes.text(x + letter, 0.5 * (high + low), measure.label, color=BLUE, fontsize=SMALL, va="center")
+    axes.text(x + letter, 0.5 * (high + low), measure.label, color=BLUE, fontsize=LABEL_SIZE, va="center")
 
 
 def draw_parts(walker: AssembledWalker) -> Figure:
@@ -321,13 +323,13 @@ def draw_parts(walker: AssembledWalker) -> Figure:
         wide = tall * (FIGURE_WIDTH / len(shown) - 0.7) / (FIGURE_HEIGHT - 1.0)
         low = 0.5 * (low + high - tall)
         axes.set(ylim=(low, low + tall), xlim=(left - 0.25 * wide, left + 0.75 * wide))
-        line = tall * 1.35 * SMALL * POINT / (FIGURE_HEIGHT - 1.0)
+        line = tall * 1.35 * LABEL_SIZE * POINT / (FIGURE_HEIGHT - 1.0)
         heights = spread([spot[1] for *_, spot in marks], [line * len(words.split("\n")) for words, *_ in marks])
         for (words, colour, marker, spot), height in zip(marks, heights, strict=True):
             axes.plot(*spot, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)
             aside = points[:, 0].max() + 0.1 * wide
             axes.plot([spot[0], aside], [spot[1], height], color=colour, linewidth=0.5, zorder=2)
-            axes.text(aside, height, f" {words}".replace("\n", "\n "), color=colour, fontsize=SMALL, va="center")
+            axes.text(aside, height, f" {words}".replace("\n", "\n "), color=colour, fontsize=LABEL_SIZE, va="center")
     figure.axes[0].set_ylabel("up (m)")
     return figure
 

@@ -14,7 +14,14 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, read_sticks
+from walkerlab.views.figures.stick_diagram import (
+    BOLD_WIDTH,
+    FAINT_WIDTH,
+    draw_postures,
+    draw_slope,
+    frame_view,
+    read_sticks,
+)
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
@@ -41,7 +48,7 @@ ACTUATIONS: Final = {
 }
 """Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
-MOST_ROWS: Final = 4
+MAX_ROWS: Final = 4
 """Maximum number of rows of a table at one point: two models, each with two legs."""
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
@@ -58,7 +65,7 @@ def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration 
     if can_be_drawn(group, parameters):
         return paper_figure(17, (), partial(plot_over_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
-    return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
+    return None if driven is None else Illustration("push-off-or-hip", (), partial(plot_drives, group, driven))
 
 
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
@@ -90,9 +97,9 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
 
 
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
-    """Return the values (points,) of a model in each row of a table: one for each leg of a pair that differs."""
+    """Return the values (points,) of a model for each of its rows in a table. Legs that differ have a row each."""
     rows = []
-    for row in range(MOST_ROWS):
+    for row in range(MAX_ROWS):
         if name.format(row) in group.variables:
             owned = group[f"{name.partition('.')[0]}.{row}.model"] == model
             rows += [np.where(owned, group[name.format(row)].astype(float), np.nan)] if owned.any() else []
@@ -109,7 +116,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
     return driven if bool(np.all(np.sum([*driven.values()], axis=0) == 1)) else None
 
 
-def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
+def plot_drives(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
     """Plot the cost of each drive, and the disturbances that its gaits survive, over speed."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
@@ -148,7 +155,7 @@ def plot_rough_ground(results: Results) -> Drawn:
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
     strikes = strikes[strikes < sticks.time.size]
     draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT_WIDTH)
-    draw_postures(walk, sticks, strikes, FULL)
+    draw_postures(walk, sticks, strikes, BOLD_WIDTH)
     draw_slope(walk, sticks)
     heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=GREY)
     heights.axhline(0.0, color=BLACK, linewidth=0.7)

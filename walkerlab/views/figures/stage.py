@@ -1,7 +1,7 @@
 """The `plot` stage: draws every figure whose results are available, as SVG and PNG.
 
-`FIGURES` has all figures in display order: those with a number of the paper, then others, including those of
-extensions.
+`FIGURES` lists all figures in display order: first those with a figure number from the paper, then the others,
+including those of extensions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,9 +43,10 @@ def run(
 ) -> Content:
     """Draw all figures whose results are available into the run's folder.
 
-    early  figures that this run has drawn already, once all that they show was there
+    left_out  results that are missing, with reasons
+    early     figures that this run has already drawn, as soon as all their results were there
 
-    Raises StorageError if one cannot be stored.
+    Raises StorageError if a figure cannot be stored.
     """
     finished = {} if early is None else {entry["svg"]: entry for entry in early.summary["figures"]}
     make_folder(folder / FIGURES_FOLDER)
@@ -59,12 +60,13 @@ def run(
             drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))
             progress.advance()
         else:
-            for path in paths_of(figure.name).values():  # drawn by an earlier run from results that no longer exist
+            # An earlier run may have drawn the figure from results that no longer exist.
+            for path in paths_of(figure.name).values():
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)
             # Figures of stages that run only on request are not reported as missing, because nobody asked for them.
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
-                missing.append({"what": figure.called, "why": reason})
+                missing.append({"what": figure.reference, "why": reason})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # Some captions quote run times, which differ from run to run, so the texts count as timings.
     summary = {"figures": drawn, "left_out": missing}
@@ -74,9 +76,9 @@ def run(
 def draw(
     figure: Illustration, results: Mapping[str, Stored], folder: Path, name: str = ""
 ) -> dict[str, str | int | list[str]]:
-    """Draw a figure and store its files under `name`, by default its own.
+    """Draw a figure, store it, and return its texts and the paths of its files relative to the run's folder.
 
-    Returns its texts, and paths relative to the run's folder.
+    name  name of the files without suffix; default: the name of the figure
     """
     drawing = figure.render(results)
     paths = paths_of(name or figure.name)

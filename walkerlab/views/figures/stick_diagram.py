@@ -40,7 +40,7 @@ POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
 FAINT_WIDTH = 0.8
 """Line width (pt) of legs between heel strikes."""
-FULL = 2.2
+BOLD_WIDTH = 2.2
 """Line width (pt) of legs at heel strikes."""
 HEADROOM = 0.19
 """Free space above the walker (leg lengths)."""
@@ -50,7 +50,7 @@ SIDEROOM = 0.12
 """Free space on either side of the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""Angles (rad) of the points of a sole's arc, and of its middle, from the leg's line."""
+"""Angles (rad) from the leg's line at which points of a sole lie: all points drawn (`ARC`), and the middle."""
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
@@ -60,7 +60,7 @@ SIDE_INCHES = 0.7
 """Room (in) for axis labels at the side."""
 ROOM_ABOVE = 1.05
 """Room (in) for the legend."""
-SHAPE = 0.68
+MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
 NO_STEPS = Group(
     {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
@@ -87,7 +87,7 @@ class Sticks:
     def pushing(self, time: float) -> int | None:
         """Return the leg whose push-off is shown at a time (s), or None if no push-off is shown."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
-        late = step < 0 or time - self.strikes[step] > SEEN_S
+        late = step < 0 or time - self.strikes[step] > PUSH_SHOWN_S
         return None if late or not self.pushes else 1 - step % 2
 
     @property
@@ -114,7 +114,10 @@ class Sticks:
         return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
 
     def arc(self, leg: int, above: Array, angles: Array) -> Array:
-        """Return points of a sole (samples, angles, 2) at angles (rad) from the line of the leg through its centre."""
+        """Return points of a sole's arc (samples, angles, 2), at angles (rad) from the line through its centre.
+
+        The line starts at the joint `above` (samples, 2), which is the knee or the hip.
+        """
         centre = self.feet[:, leg] + np.array([0.0, self.radii[leg]])
         down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
         ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
@@ -129,7 +132,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the indices of the first cycle's samples at its start and heel strikes, and of samples in between."""
+        """Return the indices of samples in the first cycle: at its start and heel strikes, and some in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, POSTURES_BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         # A walk that ends within its first cycle is drawn up to its end.
@@ -192,7 +195,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
     left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
-    widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
+    widen = max(0.0, 0.5 * ((top - bottom) / MAX_ASPECT - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(0.0)
     across = figure.get_figwidth() - SIDE_INCHES
@@ -202,7 +205,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
     draw_postures(axes, sticks, between, FAINT_WIDTH)
-    draw_postures(axes, sticks, at_strikes, FULL)
+    draw_postures(axes, sticks, at_strikes, BOLD_WIDTH)
     shown = slice(0, int(rows.max()) + 1)
     axes.plot(*sticks.project(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
     annotate(axes, sticks, sticks.top[shown])
@@ -268,7 +271,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 def entries(sticks: Sticks) -> list[Artist]:
     """Return the legend entries of the legs, the hip and any torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
-    strike = entry("at heel strike", color=GREY, linewidth=FULL)
+    strike = entry("at heel strike", color=GREY, linewidth=BOLD_WIDTH)
     between = entry("between", color=GREY, linewidth=FAINT_WIDTH)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
     torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
@@ -276,7 +279,7 @@ def entries(sticks: Sticks) -> list[Artist]:
 
 
 PAD_HEIGHT = 0.028
-"""Thickness of a drawn pad (leg lengths); the model's pads have none."""
+"""Thickness of a drawn pad (leg lengths). In the model, pads have no thickness."""
 PADS: Final[tuple[dict[str, Any], ...]] = tuple(
     {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
     for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
@@ -322,14 +325,14 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
 FILM_NEEDS = {
     stage: Need(stage, TRAJECTORY, (*STATE_VARIABLES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
-"""Variables that an animation needs; a walk that ends in its first step can be animated too."""
+"""Variables that an animation needs. Steps are not among them, because a walk can end in its first step."""
 FIGURE_2, FIGURE_6 = (
     paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
     for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
-SEEN_S = 0.08
+PUSH_SHOWN_S = 0.08
 """Time for which an animation shows a push-off (s)."""
 PUSH_SHARE = 0.3
 """Length of the mark of a push-off relative to the leg."""
@@ -338,15 +341,19 @@ FILM_SIZE = (6.4, 3.6)
 FILM_DPI = 100
 """Resolution of a frame (pixels per inch)."""
 STEPS_SHOWN = 4
-RELIEF = 0.04
+RELIEF_HEIGHT = 0.04
 """Maximum height of the magnified ground profile (leg lengths)."""
 RELIEF_DEPTH = 0.075
 """Distance of the magnified ground profile below the ground (leg lengths)."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Return frame times (s) of an animation, by default of four steps or, for a fall, the last four and the fall."""
-    # The last frame of a fall is shown for a second, so that the fall can be seen.
+    """Return the times (s) of an animation's frames. The last frame of a fall lasts a second, so that it can be seen.
+
+    steps   number of steps shown, from the first; None: four or, for a fall, the last four and the fall
+    rate    frames per second
+    slower  slow-motion factor
+    """
     begin = 0
     shown = STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
@@ -363,7 +370,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     """Draw the ground profile again below the ground, magnified until visible, and print the factor."""
     if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[:, 1]).max())):
         return
-    room = RELIEF * sticks.leg_length / roughest
+    room = RELIEF_HEIGHT * sticks.leg_length / roughest
     ten = 10.0 ** math.floor(math.log10(room))
     times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
     if times <= 1.0:
@@ -381,7 +388,7 @@ def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
         lines += [sticks.sole(leg) for leg in range(2)]
     if sticks.head is not None:
         lines.append(np.stack((sticks.hip, sticks.head), axis=1))
-    # Linear interpolation is exact enough, because both sides of a heel strike are samples and no interval spans one.
+    # Linear interpolation suffices: both sides of a heel strike are samples, so no interval contains its jump.
     flat = [line.reshape(line.shape[0], -1) for line in lines]
     places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
     return [sticks.project(place.reshape(at.size, -1, 2)) for place in places]

@@ -1,6 +1,6 @@
 """Sizes, fonts, colours and line styles shared by all figures.
 
-The colours are those of Okabe and Ito, for colour-blind readers; overlapping series also differ in brightness and line
+The colours are those of Okabe and Ito, for colour-blind readers. Overlapping series also differ in brightness and line
 style, so that figures remain readable in greyscale.
 """
 
@@ -57,7 +57,7 @@ RC: Final = {
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
 }
-"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc; TrueType fonts for journals.
+"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc.
 
 Labels, ticks and legends have `font.size`, matplotlib's default.
 """
@@ -70,7 +70,7 @@ NARROW: Final = {
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.0,
 }
-"""Further settings for one-column figures; superscripts of 7.2 pt labels are 5 pt high."""
+"""Further settings for one-column figures. The superscripts of labels of 7.2 pt are 5 pt high."""
 
 
 @dataclass(frozen=True)

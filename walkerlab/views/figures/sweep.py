@@ -24,11 +24,11 @@ SWEEP_PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
-"""Maximum number of lines, one for each value of a second parameter; with more values a map is drawn."""
+"""Maximum number of lines, one for each value of a second parameter. With more values, a map is drawn."""
 SWEEP_DASHES: Final = ("-", "--", "-.")
 STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
-"""Maximum number of points plotted in a panel; if there are more, an even selection is plotted."""
+"""Maximum number of points plotted in a panel. If there are more, an evenly spaced selection is plotted."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
     "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
@@ -71,10 +71,10 @@ def illustration(
 def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against: str, _results: Results) -> Drawn:
     """Plot a sweep. The caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
     dimensions = group["outcome"].ndim
-    # with few values of one parameter, a line is drawn for each
+    # If one of two parameters has few values, each gets a line instead of a map.
     a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
     if against:
-        figure = one_over_another(group, names, against)
+        figure = plot_against(group, names, against)
     elif dimensions != 2:
         figure = plot_scatter(group, parameters, names)
     else:
@@ -86,7 +86,7 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
     return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
 
 
-def one_over_another(group: Group, names: Sequence[str], against: str) -> Figure:
+def plot_against(group: Group, names: Sequence[str], against: str) -> Figure:
     """Plot each quantity over the quantity `against`, a row each, and join the points in order if one
     parameter varies.
     """

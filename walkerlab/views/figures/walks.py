@@ -47,7 +47,7 @@ STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values claimed by a study for this scene, or nothing for other scenes."""
+    """Return the values that a study claims for this scene, or nothing if no study covers the scene."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
@@ -164,7 +164,7 @@ def redoes_the_procedure(results: Results) -> bool:
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """Plot the rigid model from its start and the contact model from the adjusted start, a row per leg."""
+    """Plot each leg's velocity in the rigid model from its start and in the contact model from the adjusted start."""
     result = results[TUNE_STAGE]
     named = redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
@@ -203,9 +203,8 @@ def draw_states(results: Results) -> Drawn:
 
 
 CYCLES = 20
-"""Number of strides shown, enough for the transient to end; further lines would only overlap."""
-LAST_STRIDE = 2
-"""Steps per stride."""
+"""Number of strides shown. Later strides would only overlap, because the transient has ended by then."""
+STEPS_PER_STRIDE = 2
 EARLIER_WIDTH = 0.5
 ARROW_LENGTH = 0.06
 """Length of an arrow on the cycle, as a fraction of the samples of a swing or stance."""
@@ -222,7 +221,7 @@ def draw_cycles(results: Results) -> Drawn:
         panel.set(title=f"({'ab'[leg]}) leg {leg + 1}", xlabel=walks[0].label("angle", "angle"))
     axes[0].set_ylabel(walks[0].label("angular velocity", "velocity"))
     key = [entry(walk.look.label, **walk.look.line) for walk in walks]
-    if any(walk.strikes.size > LAST_STRIDE for walk in walks):
+    if any(walk.strikes.size > STEPS_PER_STRIDE for walk in walks):
         key.append(entry("strides before the last", color=GREY, linewidth=EARLIER_WIDTH))
     for look in (walk.look for walk in walks):
         for whose, face in (("own", look.colour), ("other", "white")):
@@ -234,14 +233,14 @@ def draw_cycles(results: Results) -> Drawn:
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Plot the last stride in the model's style, with earlier strides as thin lines behind it."""
-    # markers show the state just before a heel strike: filled if this leg strikes, open if the other does
+    # Markers show the state just before a heel strike. They are filled if this leg strikes, open if the other one does.
     angle = walk["angle"][:, leg]
     velocity = walk["velocity"][:, leg]
     look = walk.look
     axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
-    last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
+    last = walk.time >= (walk.strikes[-1 - STEPS_PER_STRIDE] if walk.strikes.size > STEPS_PER_STRIDE else 0.0)
     line(axes, angle[last], velocity[last], look)
-    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-LAST_STRIDE:]) - 1, 0)
+    before = np.maximum(np.searchsorted(walk.time, walk.strikes[-STEPS_PER_STRIDE:]) - 1, 0)
     strikes_itself = walk["stance_leg"][before] != leg + 1
     for rows, face in ((before[strikes_itself], look.colour), (before[~strikes_itself], "white")):
         axes.plot(
@@ -271,7 +270,7 @@ ENERGIES_IN_TIME = (
     ("mechanical_J", "energy", None, "(c) mechanical energy"),
 )
 SMALLEST_SPAN = 0.005
-"""Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
+"""Minimum span of the mechanical-energy axis relative to the energy, so that a constant energy looks constant."""
 RANGE_MARGIN = 0.08
 TRIMMED_SHARE = 0.005
 """Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""

@@ -125,7 +125,7 @@ def energy_lost(dissipated: Mapping[str, float]) -> str:
 
 STEP_HEADS = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
 WALK_ROWS = (
-    *gaits.works(partial(number, digits=4)),
+    *gaits.work_columns(partial(number, digits=4)),
     walk_row("speed", "speed_m_s"),
     walk_row("Froude number", "froude"),
     walk_row("cost of transport", "cost_of_transport"),
@@ -177,7 +177,7 @@ def each_step(summary: Summary) -> dict[str, Summary]:
 
 
 def settling_sentences(summary: Summary) -> Iterator[str]:
-    """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
+    """Yield sentences about the gait that a walk leaves, and about the cycle of steps with which it ends."""
     from walkerlab.views.report.sections.walks import format_step
 
     steps = summary["steps"]
@@ -207,7 +207,7 @@ def tune(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import adjustment
 
     gait = summary["gait"]
-    missing = "" if gait["found"] else f"No own gait: {gait['reason']}."
+    missing = "" if gait["found"] else f"The contact model has no gait of its own: {gait['reason']}."
     gait_table = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
     sentences = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
     return [*sentences, gait_table, adjustment.margins_table(summary)]

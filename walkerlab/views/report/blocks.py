@@ -56,7 +56,7 @@ class Shares:
     """Counts that make up a whole, shown as a bar with a legend."""
 
     title: str
-    parts: tuple[tuple[str, int, Tone], ...]
+    parts: tuple[tuple[str, int, Tone], ...]  # label, count and tone of each part
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Walker:
     strikes: tuple[float, ...]  # times of the heel strikes (s)
     # postures, each a line through the joints: mm along the slope, and mm normal to it (down is positive)
     stills: tuple[tuple[tuple[int, int], ...], ...]
-    ends: str = ""
+    ends: str = ""  # how the walk failed, in words; empty if it did not
     pushes: bool = False  # whether the trailing foot pushes off as the other foot lands
 
     @property
@@ -172,8 +172,7 @@ class Player:
 class GaitMark:
     """A point of a diagram whose gait the player can show."""
 
-    # x, y: position in diagram units
-    x: float
+    x: float  # position in diagram units, as y
     y: float
     stable: bool
     walker: Walker  # motion; its name describes the gait
@@ -192,7 +191,7 @@ class Diagram:
     BOTTOM: ClassVar[int] = 46
     title: str
     caption: str
-    titles: tuple[str, str]
+    titles: tuple[str, str]  # of the two axes
     # points of each line, and whether the gaits on it are stable
     curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
     # position and text of the ticks of both axes
@@ -201,7 +200,7 @@ class Diagram:
 
 
 PageBlock = Paragraph | Statements | Shares | Gallery | Cards | Terms | Code | Player | Diagram | Table
-"""A part of a section; its file in templates/blocks has the name of the class."""
+"""A part of a section. Its template in templates/blocks has the name of the class."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +210,7 @@ class Section:
     anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""  # one-sentence result; if there is one, the section is folded and shows only this sentence
+    finding: str = ""  # result in brief; if there is one, the section is folded and shows only this text
     page: str = MAIN  # file of the page
 
     @classmethod
@@ -242,7 +241,7 @@ class Results:
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Values claimed by a study for this scene, with verdicts. It is empty for other scenes."""
+        """Values that a study claims for this scene, with verdicts. Empty if no study covers the scene."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:

@@ -13,7 +13,7 @@ from walkerlab.views.report.words import legs_differ, words
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-"""Coordinates of a compass; results of other walkers store the names of their coordinates."""
+"""Coordinates of a compass. Results of other walkers store the names of their coordinates."""
 LEG_ROLES = {"1": "swing", "2": "stance"}
 """Role of each leg in the step that begins in a gait's state."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
@@ -21,7 +21,11 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 
 
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
-    """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
+    """Tabulate gaits and their multipliers, with a column for each set of equations.
+
+    sets   gait by the name of its set of equations
+    names  names of the gait's coordinates
+    """
     six = partial(numbers.fixed, decimals=6)
     multipliers = range(max(len(multipliers_of(gait)) for gait in sets.values()))
     differ = any(legs_differ(gait) for gait in sets.values())
@@ -37,7 +41,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
             f"spectral radius{' per step' if differ else ''}", "spectral_radius", partial(numbers.fixed, decimals=5)
         ),
         Column("stable", "stable"),
-        *works(partial(numbers.number, digits=4)),
+        *work_columns(partial(numbers.number, digits=4)),
         measured("speed", "speed_m_s", partial(numbers.fixed, decimals=4)),
         measured("Froude number", "froude", partial(numbers.fixed, decimals=4)),
         measured("cost of transport", "cost_of_transport", partial(numbers.fixed, decimals=5)),
@@ -51,7 +55,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         Column("residual of the step map", "residual", partial(numbers.power_of_ten, digits=2)),
     ]
     both = len(sets) > 1
-    # the corrected set needs a label only next to the printed one
+    # The corrected set needs a label only next to the printed one.
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
     return side_by_side(caption, lines, gaits, note=note)
@@ -68,7 +72,7 @@ def step_value(place: int, key: str, gait: Mapping[str, Any]) -> float:
 
 
 def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield lines with the period and length of both steps of a gait, and their asymmetries."""
+    """Yield table lines for the period and length of both steps of a gait, and for their asymmetries."""
     for index, leg in enumerate(("leg 1", "leg 2")):
         for name, key in (("period", "period_s"), ("length", "length_m")):
             title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
@@ -93,8 +97,8 @@ def source_work(name: str, record: Mapping[str, Any]) -> float | None:
     return work[name] if abs(work.get(name, 0.0)) > WORK_ROUNDING * largest else None
 
 
-def works(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield a column for each source of work. Values at rounding level are omitted."""
+def work_columns(written: Callable[[Any], str]) -> Iterator[Column]:
+    """Yield a column for the work of each source per step. Values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
         yield Column(f"work of {source} per step (J)", partial(source_work, name), written)
 
@@ -148,12 +152,12 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     blocks = (
         Paragraph(words("gait.disturbances", summary)),
         gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
-        every_gait(every, names) if any(len(gait) > 1 for gait in every.values()) else None,
+        tabulate_gaits(every, names) if any(len(gait) > 1 for gait in every.values()) else None,
     )
     return Section.create("gait", "The gait", blocks, words("gait.finding", summary))
 
 
-def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
+def tabulate_gaits(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
     """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
     four = partial(numbers.fixed, decimals=4)
     five = partial(numbers.fixed, decimals=5)

@@ -57,7 +57,7 @@ NONE = "–"
 SPACE = "\u00a0"
 """No-break space between a number and its unit."""
 MIN_LENGTH_M = 1e-9
-"""Lengths below this count as zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
+"""Shorter lengths count as zero. Walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
 PLAIN_FROM = 1e-4
 PLAIN_BELOW = 1e6
 """Range of magnitudes written without a power of ten."""
@@ -113,7 +113,7 @@ def drop_rounding(value_m: float) -> float:
 
 
 def length(value_m: float | None, digits: int = 4) -> str:
-    """Format a length in m, mm or µm, whichever reads best, and as 0 m below `MIN_LENGTH_M`."""
+    """Format a length in m, mm or µm, depending on its size, and as 0 m below `MIN_LENGTH_M`."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
     value_m = drop_rounding(value_m)

@@ -21,7 +21,7 @@ from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture, Section
 from walkerlab.views.report.numbers import CARET, POWER, power, to_superscript
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
-"""Page of each figure by the first part of its name; all other figures are on the main page."""
+"""Page of each figure by the first part of its name. All other figures are on the main page."""
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
@@ -31,7 +31,7 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
     Raises FileNotFoundError if a listed file does not exist.
     """
     figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
-    files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
+    files = choose_images([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
     return tuple(picture(figure, folder, file.suffix, numbered) for figure, file in zip(figures, files, strict=True))
 
 
@@ -44,7 +44,7 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
     with svg.open("rb") as file:
         # The attribute is in the root element, at the beginning of the file.
         box = VIEW_BOX.search(file.read(2000))
-    # size in CSS pixels, to reserve space while loading; 0 if unknown
+    # The size in CSS pixels reserves space while the page loads. It is 0 if unknown.
     width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
     number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
     title = f"{number}{figure['title']}."
@@ -68,13 +68,14 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
 
 
 MAX_BYTES = 1_400_000
-"""Maximum size of all images together; the largest drawings are embedded as PNG until all fit."""
+"""Maximum size of all images together."""
 
 
-def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """Choose SVG files, replacing the largest by PNG until all fit in `most` bytes.
+def choose_images(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
+    """Choose the SVG of each drawing, then replace the largest ones by PNG until all fit in `most` bytes.
 
-    Raises FileNotFoundError if one is missing.
+    drawings  SVG and PNG file of each drawing
+    Raises FileNotFoundError if a file is missing.
     """
     chosen = [svg for svg, _ in drawings]
     sizes = [svg.stat().st_size for svg in chosen]
@@ -94,7 +95,7 @@ SVG_ELEMENTS = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}
 )
-"""Elements and attributes that are copied; none of them runs or loads anything."""
+"""Elements and attributes that are copied. None of them runs or loads anything."""
 ATTRIBUTES = frozenset(
     {"viewBox", "d", "x", "y", "x1", "y1", "x2", "y2", "cx", "cy", "r", "width", "height", "points", "transform"}
     | {"style", "id", "clip-path", "preserveAspectRatio", "patternUnits", "fill", "stroke"}
@@ -200,7 +201,7 @@ def render(page: Page) -> str:
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
-    # Markup only for the package's own files; all other texts are escaped.
+    # Only the package's own files are markup. All other texts are escaped.
     trusted = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
     return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **trusted)
 

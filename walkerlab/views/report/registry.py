@@ -1,7 +1,7 @@
 """The sections of the report in order, including those of extensions.
 
 Each entry is a function that builds a `Section` from the results, or returns None if it has nothing to show. It reads
-`Results.summary(stage)` (empty if the stage did not run) and `Results.group(stage, path)` (None in that case).
+`Results.summary(stage)` and `Results.group(stage, path)`. If the stage did not run, they are empty and None.
 """
 
 import math

@@ -24,7 +24,7 @@ def run(
 ) -> Content:
     """Write the report's pages into the run's folder.
 
-    Raises StorageError if one cannot be stored.
+    Raises StorageError if a page cannot be stored.
     """
     progress.start("report", 1)
     written, results = write_pages(config, inputs, folder, left_out)
@@ -45,9 +45,9 @@ def write_pages(
 ) -> tuple[tuple[Page, ...], Results]:
     """Write pages of the available results, and remove pages that have no content.
 
-    Raises StorageError if that fails.
+    Raises StorageError if a page cannot be stored or removed.
     """
-    # This is also called while other stages are running, and when the command is stopped.
+    # This is also called while other stages are running and when the command is stopped, with results still pending.
     pending = tuple(entry for entry in left_out if entry.why in (STILL_COMPUTED, STOPPED))
     absent = tuple(entry for entry in left_out if entry not in pending)
     names = {entry.what for entry in absent}

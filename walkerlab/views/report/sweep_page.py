@@ -27,9 +27,10 @@ MAX_ROWS = 200
 
 
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> tuple[Path, list[Path]]:
-    """Plot a sweep's quantities over its parameters, or over `against`, and return its page and the files of its
-    figure.
+    """Plot a sweep, write its page, and return the paths of the page and of the figure's files.
 
+    names    quantities to plot; if empty, `choose` selects them
+    against  quantity on the horizontal axis; if empty, the parameters
     Raises ConfigError for an unknown quantity, StorageError if writing fails.
     """
     group = swept.group
@@ -61,7 +62,10 @@ def check_quantities(group: Group, names: Sequence[str], option: str = "--show")
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity in `names` (by option). Quantities in blocks may still appear later."""
+    """Raise ConfigError for an unknown quantity. `names` has the quantities by option, as in '--show speed_m_s'.
+
+    A quantity in a block of the summary may still appear with a later point, so it is not refused.
+    """
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

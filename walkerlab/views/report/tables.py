@@ -1,4 +1,4 @@
-"""Tables, described once by columns and records, for pages, terminal and CSV; and JSON values as text."""
+"""Tables, described once by columns and records, for pages, terminal and CSV, and summaries as text."""
 
 import re
 import textwrap

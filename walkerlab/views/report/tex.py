@@ -10,7 +10,7 @@ from walkerlab.views.report.numbers import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPT
 from walkerlab.views.report.tables import Table, flatten
 
 COLUMN_DIGITS: Final = 5
-"""Significant digits of a column's largest number or, if its numbers differ too much, of each number."""
+"""Significant digits of the largest number in a column or, if the numbers differ too much in size, of each number."""
 MAX_PLAIN: Final = 1e6
 """Magnitude from which numbers are written with a power of ten."""
 EMPTY_CELL: Final = "--"
@@ -55,7 +55,7 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 def as_tex(content: Table, columns: int = 1) -> bytes:
     """Format a table for booktabs and siunitx, as a float if it has a caption. Columns of sentences are left out.
 
-    columns  journal columns that the table spans; its type is as small as they require
+    columns  journal columns that the table spans, which determine the size of its type
     """
     titles, rows = flatten(content)
     data = [[row[index].datum for row in rows] for index in range(len(titles))]
@@ -81,7 +81,7 @@ def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
 
 
 def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return the lines of each column's head: one word above the other, and the unit in a row of its own."""
+    """Return the lines of each column's head. Its words are wrapped to the column, and the unit has a separate line."""
     parts = [TITLE.fullmatch(title) for title in titles]
     has_units = any(part and part["unit"] for part in parts)
     heads = []
@@ -121,7 +121,7 @@ def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
     decimals = max(0, COLUMN_DIGITS - 1 - math.floor(math.log10(max(sizes))))
-    # equal decimals if the smallest number loses at most one digit
+    # Equal decimals are used only if the smallest number loses at most one digit by that.
     if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
     return lambda value: "0" if value == 0.0 else format_digits(value)
@@ -133,7 +133,7 @@ def format_digits(value: float) -> str:
 
 
 def room_for(cells: Sequence[str]) -> str:
-    """Return siunitx's table-format: digits before and after the decimal point, and of the exponent."""
+    """Return the table-format of siunitx: how many digits stand before and after the point, and in the exponent."""
     parts = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
     sign, before, behind, below, power = (max(len(groups[index]) for groups in parts) for index in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")

@@ -21,7 +21,7 @@ LEG_CHANNELS = {
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
 }  # fmt: skip
-"""Name of the channel for each stored variable."""
+"""Channel of each stored variable that has a value for each leg. The index of the leg is appended to it."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -31,10 +31,16 @@ Channels = dict[str, Array]
 class Track:
     """The motion of one walker, an array for each channel."""
 
-    # channels by name, of equal length: 't' time (s); 'h' hip, 'f' lowest points of the feet and 'k' knees, each with x
-    # along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s); 'b' angle of the
-    # shanks, 'u' of the torso; 's' stance leg; 'n', 'd' normal force and friction (N); 'p' penetration and 'q' slip
-    # since touchdown (m); 'ke', 'pe', 'me' energies (J); a final digit is the leg
+    # Channels by name, all of the same length. A final digit is the index of the leg.
+    # t           time (s)
+    # hx, fx, kx  positions of the hip, of the lowest points of the feet and of the knees, along the slope (m)
+    # hy, fy, ky  heights of these points above the slope (m)
+    # a, v        angle and angular velocity of the legs or thighs (rad, rad/s)
+    # b, u        angles of the shanks and of the torso (rad)
+    # s           stance leg
+    # n, d        normal force and friction (N)
+    # p, q        penetration, and slip since touchdown (m)
+    # ke, pe, me  kinetic, potential and mechanical energy (J)
     channels: Channels
 
     def __getitem__(self, name: str) -> Array:
@@ -65,7 +71,7 @@ class Track:
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
     def pack(self) -> str:
-        """Encode all channels, in order, as little-endian float32 in base64."""
+        """Encode all channels, one after the other, as little-endian float32 in base64."""
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
@@ -97,5 +103,5 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Return the time between samples (s), in proportion to the leg's pendulum time."""
+    """Return the time between samples (s), in proportion to the leg's pendulum time: small walkers move faster."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

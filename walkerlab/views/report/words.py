@@ -26,7 +26,7 @@ def ends(outcome: str) -> str:
 
 
 def walks(steps: int, outcome: str) -> str:
-    """Describe how far a walker gets, as the predicate of a sentence about it."""
+    """Describe how far a walker gets, as a predicate: 'walks all 10 steps', or 'walks 3 steps and then falls'."""
     if outcome == WALKED_LABEL:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
@@ -50,8 +50,8 @@ ERROR_TEXTS = {
 """Text and unit of each quantity that has a numerical error."""
 
 
-MUCH_SMALLER = 0.01
-"""Ratio of the last step's error to the largest one below which the answer gives both."""
+MAX_LAST_ERROR_RATIO = 0.01
+"""The answer also gives the error of the last step if it is less than this fraction of the largest one."""
 
 
 def describe_error(error: Mapping[str, Any]) -> str:
@@ -62,18 +62,18 @@ def describe_error(error: Mapping[str, Any]) -> str:
         f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERROR_TEXTS.items() if key in error
     )
     last = [steps[-1] for name, steps in error.get("of_steps", {}).items() if name == "step_period_s"]
-    if last and last[0] < MUCH_SMALLER * error["step_period_s"]:
+    if last and last[0] < MAX_LAST_ERROR_RATIO * error["step_period_s"]:
         text += f" (in the period of the last step {quantity(last[0], 's', 1)})"
     return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"
 
 
 def legs_differ(gait: Mapping[str, Any]) -> bool:
-    """Whether a gait is that of a walker with different legs, so that only its strides have multipliers."""
+    """Whether a gait is that of a walker with different legs. Then only its strides have multipliers, not its steps."""
     return "gait_steps" in gait and "multipliers" not in gait
 
 
 def describe_limp(gait: Mapping[str, Any]) -> str:
-    """Describe, after a multiplier, the difference between the steps of both legs, or return '' for equal legs."""
+    """Continue a sentence that ends in a multiplier with the difference between both legs' steps, if they differ."""
     if not legs_differ(gait):
         return ""
     period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))

@@ -44,7 +44,7 @@ function fromFragment() {
   byId("config").value = state.config;
 }
 
-// Add to the history only values at which a slider is released.
+// Called when a slider is released: with every value on the way in the history, the Back button would be useless.
 function remember() {
   if (fragment() !== remember.last) history.pushState(null, "", fragment());
   remember.last = fragment();
@@ -88,8 +88,8 @@ function say(text, tone = "plain") {
   byId("message").className = `statement ${tone}`;
 }
 
-// Remove positions in a command line, which mean nothing on a page.
 const asSentence = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
+// Positions in a command line or file mean nothing on a page.
 const withoutPosition = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
 const sentence = ({ message, advice }) => [withoutPosition(message), advice].map(asSentence).join(" ").trim();
 
@@ -128,7 +128,7 @@ function showPlayer(walks) {
   for (const part of byId("stage").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
 }
 
-// A steady walk repeats its last two steps: [end, start, length].
+// End (s), start (s) and length (m) of a walk's last two steps, which a steady walk repeats.
 function lastLap(track) {
   const strikes = [0, ...track.strikes];
   const last = 2 * Math.floor(track.strikes.length / 2);
@@ -423,7 +423,7 @@ class Along extends Plot {
     this.cursor.replaceChildren(this.line, this.dot);
     this.mark();
   }
-  // Quantity of the gait shown; undefined if only the contact model's curves are plotted.
+  // Plotted quantity of the gait shown, or undefined if only the contact model's curves are plotted.
   get height() {
     const gait = shown?.answer.fixedpoint ?? {};
     const quantity = byId("quantity").value;

@@ -52,7 +52,7 @@ def costs(summary: Row) -> Table:
 
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
     """Yield the methods of a scene, each with its fastest run for each error level and its smallest error."""
-    # errors below the uncertainty of the reference are shown as upper bounds
+    # Errors below the uncertainty of the reference are known only to be below it.
     best = summary["best"].get(scene, {}).values()
     bound = float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
@@ -115,7 +115,7 @@ NOT_RUN_COLUMNS = (
 
 
 def not_run(summary: Row) -> Table:
-    """Tabulate the tolerances that were not run, a row per reason."""
+    """Tabulate the tolerances at which methods were not run, with a row for each scene, method and reason."""
     groups = grouped(summary.get("not_run", []), "scene", "method", "why").values()
     rows = [{**entries[0], "tolerances": [float(entry["tolerance"]) for entry in entries]} for entries in groups]
     return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

@@ -7,7 +7,7 @@ from typing import Any
 from walkerlab.config.drives import push_offs
 from walkerlab.labels import join_words
 from walkerlab.views.report.blocks import COSTS, Paragraph, Results, Section, stage_section
-from walkerlab.views.report.gaits import symbol, works
+from walkerlab.views.report.gaits import symbol, work_columns
 from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity, typeset
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import tone, words
@@ -54,9 +54,7 @@ def limit(results: Results) -> Section | None:
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the start before and after the adjustment. For the scene of the paper, its Table 2 is shown next to
-    them.
-    """
+    """Tabulate the start before and after the adjustment. If the scene is the paper's, include its Table 2."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption = "The start before and after the adjustment"
     note = ""
@@ -79,7 +77,7 @@ LOSS_HEADS = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Energy losses per step: stored name, label, and text for the rigid model."""
+"""Label of each energy loss per step, and the text for the rigid model, by stored name."""
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
@@ -89,7 +87,7 @@ def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
-    """Format multipliers, with ± for a conjugate pair."""
+    """Format multipliers (real, imaginary), with ± for a conjugate pair."""
     pairs = ((fixed(real, 4), imag) for real, imag in multipliers if imag >= 0.0)
     return join_words(f"{real} ± {fixed(imag, 4)}i" if imag > 1e-9 else real for real, imag in pairs)
 
@@ -105,7 +103,7 @@ GAIT_LINES = (
         Column(f"energy lost {label}", partial(lost_energy, channel), partial(quantity, unit="J"))
         for channel, (label, _) in LOSS_HEADS.items()
     ),
-    *works(number),
+    *work_columns(number),
 )
 
 

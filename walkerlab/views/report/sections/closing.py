@@ -15,7 +15,7 @@ from walkerlab.views.report.words import words
 
 def provenance_section(results: Results) -> Section | None:
     stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # these have a provenance
-    note = "A key covers config, inputs and code; equal keys give equal digests. Neither includes timings."
+    note = "A key covers config, inputs and code. Equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
         table("Computation of each result", RESULT_COLUMNS, stored),
@@ -93,9 +93,12 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield, for each reason, a row with the results missing for it and, if any, one with those that need them."""
+    """Yield a row for each reason with the results that it affects, then a row with the results that need those.
+
+    A row has the results, the reason, and what their omission saves.
+    """
     reasons = {absent.why for absent in missing}
-    # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
+    # The last part is the innermost reason: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'.
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for reason in dict.fromkeys(causes.values()):
         same_reason = [absent for absent in missing if absent.why == reason]

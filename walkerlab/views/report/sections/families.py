@@ -52,9 +52,9 @@ def parameter(summary: Mapping[str, Any]) -> str:
 
 DIAGRAM_MODEL = "rigid"
 MIN_MARK_DISTANCE = 16.0
-"""Minimum distance between two marks (diagram units): 1.5 times their width, for touch screens."""
+"""Minimum distance between two marks (diagram units). It is 1.5 times their width, so that a finger can select one."""
 SAMPLING_MARGIN = 3.0
-"""Sampling interval relative to that of the walks; coarser, since these gaits are only viewed."""
+"""Sampling interval relative to that of the walks. It is coarser, because these gaits are only viewed."""
 
 
 class DiagramAxis:
@@ -63,7 +63,7 @@ class DiagramAxis:
     def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
         least = float(values.min())
         most = float(values.max())
-        # All values may be equal.
+        # If all values are equal, the axis needs some span.
         room = 0.04 * (most - least) or 1.0
         self.least = least - room
         self.most = most + room
@@ -83,8 +83,9 @@ class DiagramAxis:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Plot step periods over the parameter, with marks for gaits whose motion is stored, or return None if no motion
-    is.
+    """Plot step periods over the parameter, with marks for gaits whose motion is stored.
+
+    Returns None if no motion is stored.
     """
     summary = results.summary("continuation")
     branches: list[Group] = []

@@ -79,12 +79,12 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
-    beside = (contradicted_priors(summary["prior"]), describe_nuisances(summary["nuisance"]), is_usable(verdict))
+    further = (contradicted_priors(summary["prior"]), describe_nuisances(summary["nuisance"]), is_usable(verdict))
     quality = (other, describe_gait(summary["gait"]), describe_noise(summary), is_usable(verdict))
     measured = summary.get("measured_spectral_radius")
     held = next(iter(sensitive_rows(summary, known)), None)
     return [
-        *words.parts("identify.findings", summary, verdict, *parameters, *beside),
+        *words.parts("identify.findings", summary, verdict, *parameters, *further),
         *(describe_limp_of_legs(summary) if is_usable(verdict) else []),
         *words.parts("identify.quality", summary, verdict, *quality),
         *([describe_radius(measured)] if measured and is_usable(verdict) else []),
@@ -123,9 +123,9 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 
 
 def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the fixed parameters, the most influential first, with the change of each estimate if one is 1 % larger.
+    """Return a row for each fixed parameter: how much every estimate changes if the parameter is 1 % larger.
 
-    A parameter is left out if its change moves all estimates by less than half a standard error.
+    The most influential parameter comes first. One that changes no estimate by half a standard error is left out.
     """
     rows = dict[str, dict[str, Any]]()
     errors = {row["key"]: row["standard_error"] for row in estimates}

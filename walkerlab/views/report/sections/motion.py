@@ -18,7 +18,7 @@ OVERLAY_STYLES = {"identified": "rigid", "measured": "contact"}
 CLOSEUP_DEPTHS = 5.0
 """Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
-"""Height of the close-up of a foot that does not sink in (leg lengths)."""
+"""Height of the close-up if feet do not sink in (leg lengths)."""
 
 
 def section(results: Results) -> Section | None:
@@ -28,7 +28,7 @@ def section(results: Results) -> Section | None:
 def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     """Animate the first steps of both models' walks, or return None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
-    # end when the slower model has taken `most` steps
+    # The animation ends when the slower model has taken `most` steps.
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
     by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
     tracks = {stage: track.cut(end) for stage, track in by_stage.items() if track is not None}
@@ -59,11 +59,11 @@ def overlay(results: Results) -> Player | None:
     """Animate the measured walk over the identified one, or return None if no angles were measured."""
     motions = {style: results.group("identify", f"{name}_motion") for name, style in OVERLAY_STYLES.items()}
     tracks = {style: track for style, motion in motions.items() if (track := track_in(motion)) is not None}
-    about = motions["rigid"]
-    if about is None or not tracks:
+    identified_motion = motions["rigid"]
+    if identified_motion is None or not tracks:
         return None
-    slope, leg, radius = (float(about.attrs[name]) for name in ("slope_rad", "leg_m", "foot_radius_m"))
-    strikes = about["time"][1:][np.diff(about["step"]) > 0].round(6).tolist()
+    slope, leg, radius = (float(identified_motion.attrs[name]) for name in ("slope_rad", "leg_m", "foot_radius_m"))
+    strikes = identified_motion["time"][1:][np.diff(identified_motion["step"]) > 0].round(6).tolist()
     walkers = [
         Walker(f"{name.capitalize()} walk", style, tracks[style], tuple(strikes), stills(tracks[style], strikes))
         for name, style in OVERLAY_STYLES.items()
@@ -97,7 +97,9 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
 
 
 def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Return postures to show together, at heel strikes and mid-step: lines from foot to hip to foot (mm, y down)."""
+    """Return the postures of the still picture, at heel strikes and mid-step. Each is a line from foot to foot (mm, y
+    down).
+    """
     times: Any = np.array([0.0, *strikes])
     instants = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], instants), 0, track["t"].size - 1)

@@ -8,8 +8,8 @@ from walkerlab.views.report.numbers import format_integer, length, number
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
-WORSE = 0.01
-"""Relative change of a measure of robustness from which it counts as worse."""
+MIN_DECLINE = 0.01
+"""Relative change above which a measure of robustness counts as worse."""
 FIRST_TABLES = 2
 """Number of tables that the terminal shows by default."""
 MAX_DERIVATIVES = 12
@@ -17,7 +17,7 @@ MAX_DERIVATIVES = 12
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity that ranks the parameters; dimensionless, since a norm in s/m depends on the walker's size."""
+"""Quantity that ranks the parameters. It is dimensionless, because a norm in s/m depends on the walker's size."""
 MODEL_COLUMN = Column("model", "model")
 LEG_COLUMN = Column("swing leg", "leg")
 NORM_COLUMNS = (
@@ -81,7 +81,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 def is_worse(row: Mapping[str, Any]) -> bool:
     """Whether a gait is less robust at the optimum than at the start: it survives less, or is more sensitive."""
     change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
-    return (change if row["quantity"].startswith("largest") else -change) < -WORSE
+    return (change if row["quantity"].startswith("largest") else -change) < -MIN_DECLINE
 
 
 @stage_section("robustness", "gaits")
@@ -113,9 +113,8 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     norms = summary["gait_sensitivity_norm"]
     legs_differ = any("leg" in row for row in norms)
     columns = (MODEL_COLUMN, *([LEG_COLUMN] if legs_differ else []), *NORM_COLUMNS)
-    ranked = sorted(
-        (row for row in rows if can_be_ranked(row)), key=lambda row: -abs(row["relative"])
-    )  # both models together
+    # The derivatives of both models are ranked together.
+    ranked = sorted((row for row in rows if can_be_ranked(row)), key=lambda row: -abs(row["relative"]))
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]

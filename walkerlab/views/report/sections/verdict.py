@@ -1,4 +1,4 @@
-"""The verdict on a study's values, and the models with their differences from the study's."""
+"""The verdict on a run and on the values of a study, and the differences between both models."""
 
 import math
 from collections import Counter
@@ -113,7 +113,7 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """Return a walk's end time (s) and the hip's height at that time (m), or None for values that are not stored."""
+    """Return the end time of a walk (s) and the hip's height at its end (m), or None for values that are not stored."""
     summary = results.summary(stage)
     trajectory = results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:

@@ -59,7 +59,7 @@ HOLDS = Cell("holds", "good")
 FAILS = Cell("does not hold", "bad")
 NOTED = Cell("does not hold (ignored)", "fair")
 NEGLIGIBLE = 1e-6
-"""Largest relative energy drift, and largest scuffing depth in leg lengths, that count as zero."""
+"""Up to this value, a relative energy drift or a scuffing depth (leg lengths) counts as zero."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
     Column("measured", "measured", wide=True),
@@ -111,7 +111,7 @@ SERIES = {
     (CONTACT_STAGE, "step_lengths_m"): "contact S (m)",
     (CONTACT_STAGE, "slips_m"): "slip of the stance foot (mm)",
 }
-"""Columns of the step table: title by stage and key."""
+"""Titles of the step table's columns, by the stage and key of their values."""
 
 
 def steps(results: Results) -> Section | None:
@@ -134,7 +134,11 @@ def steps(results: Results) -> Section | None:
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows. Slips are in mm."""
+    """Format a quantity of one step with the decimals that its numerical error allows. Slips are in mm.
+
+    place  index of the step, from 0
+    key    key of the quantity in the summary
+    """
     value = summary[key][place]
     factor = 1e3 if key == "slips_m" else 1.0
     errors = summary.get("numerical_error") or {}

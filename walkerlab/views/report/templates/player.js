@@ -2,7 +2,7 @@ const TAU = 2 * Math.PI;
 const UNITS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
 const minus = (text) => text.replace("-", "−");
 const digits = (value, count = 4) => (value === undefined ? "–" : minus(Math.abs(value) < 1e-12 ? "0" : Number(value.toPrecision(count)).toString()));
-// Lengths below a nanometre are rounding errors.
+// Lengths below a nanometre are rounding errors and shown as zero.
 const metres = (value, count = 3) => {
   const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? [Infinity, "m"];
   return `${digits(value / scale, count)} ${unit}`;
@@ -38,7 +38,7 @@ class Track {
     this.over = time > this.end + 1e-6;
     this.time = time;
   }
-  // The leg that pushes off, kept for 0.08 s to make it visible, or -1 if no leg does.
+  // The leg that pushes off, or -1 if no leg does. A push-off lasts for 0.08 s here, to make it visible.
   get pushing() {
     const step = this.strikes.findLastIndex((strike) => strike <= this.time);
     return this.pushes && step >= 0 && this.time - this.strikes[step] < 0.08 ? 1 - (step % 2) : -1;
@@ -548,7 +548,7 @@ function play(root, firstScene, firstTracks) {
   };
   find(".live").hidden = false;
   root.classList.add("scripted");
-  // As wide as the figure, which has no box of its own on a phone.
+  // The controls are as wide as the figure, which cannot be observed because it has no box of its own on a phone.
   new ResizeObserver(fit).observe(find(".controls"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   // Users who prefer reduced motion start at a quarter of the speed.
