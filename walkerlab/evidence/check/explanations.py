@@ -383,7 +383,10 @@ def find_strike_at_start(question: Question) -> Iterator[Explanation]:
 
 
 def conventions(question: Question) -> Iterator[Explanation]:
-    """Yield other conventions under which the right gait has every printed digit. Keep those with the fewest changes."""
+    """Yield other conventions under which the right gait has every printed digit.
+
+    Only those with the fewest changes are kept.
+    """
     found: dict[str, int] = {}
     for what, walk in scenes(question):
         for other in (question.convention, *alternatives(question.convention)):
