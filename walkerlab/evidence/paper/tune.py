@@ -296,7 +296,7 @@ class TuneRun:
         self.paper: AdamsWalk | None = None  # walk from the paper's ADAMS start, only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
-        """Run the procedure: walks, map and adjusted start with margins. For the paper's compass, also try its start."""
+        """Run the procedure: walks, map, adjusted start and margins. For the paper's compass, also try its start."""
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.pins_foot else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))

@@ -8,14 +8,14 @@ from walkerlab.config.analyses import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
-"""Name of the measure of cost. It is unrelated to correctness, so it never counts as the worst measure."""
+"""Name of the measure of cost. It says nothing about correctness, so it never counts as the worst measure."""
 
 MAGNIFIED: Final = 10.0  # factor by which a walk may magnify the errors of its steps
 
 
 @dataclass(frozen=True)
 class Measure:
-    """Dimensionless measure of a walk's correctness or cost, with its largest acceptable value."""
+    """A dimensionless measure of how correct or expensive a walk is."""
 
     measure: str
     value: float
@@ -77,9 +77,9 @@ def finite(value: float) -> float:
 def allowed_difference(case: Case, rtol: float, steps: int) -> float:
     """Return the largest expected difference between the times of two walks, in pendulum times.
 
-    rtol   the larger relative tolerance of the two walks
-    steps  number of solver steps in both walks together
+    The error of a step may reach rtol, because values are of order one.
 
-    The error of a step may reach rtol, since values are of order one.
+    rtol   relative tolerance of the less accurate walk
+    steps  number of solver steps in both walks together
     """
     return min(case.agreement, MAGNIFIED * rtol * steps)
