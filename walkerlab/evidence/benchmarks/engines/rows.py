@@ -39,7 +39,7 @@ class EngineRow:
 
 @dataclass(frozen=True)
 class SwingRow:
-    """Swing of the pinned walker, without ground contact. An integrator's first run has no observed order."""
+    """Swing of the pinned walker, without ground contact. The first run of an integrator has no observed order."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
@@ -55,7 +55,7 @@ class SwingRow:
 
 @dataclass(frozen=True)
 class TuningRow:
-    """Property of a tuned contact model, and its target."""
+    """A measured property of a tuned contact model, and the target."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
