@@ -376,7 +376,7 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """Integrate the swing by our equations and SciPy's DOP853. Return the end state and the function energy(state) (J)."""
+    """Integrate the swing by our equations and SciPy's DOP853. Return end state and function energy(state) (J)."""
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
