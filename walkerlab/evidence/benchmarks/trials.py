@@ -122,7 +122,7 @@ class RigidTrial:
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """Return a function that simulates the walk with a method. Its calls reuse memory, so that they can be timed."""
+        """Return a function that simulates the walk with a method. It reuses memory, so that its calls can be timed."""
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             assert self.compass is not None, "the script is not among this walker's methods"
