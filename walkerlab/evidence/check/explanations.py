@@ -27,18 +27,18 @@ from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, Mistake,
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
-REFINED: Final = 5  # number of candidates whose gaits are solved
+MAX_SOLVED: Final = 5  # number of candidates whose gaits are solved
 FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
-SAME_WALK = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
+SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
 # rounds in which the size of a mistake is fitted, and how many times closer the fit must bring gaits
-FITTING_ROUNDS, LEAST_GAIN = 4, 3.0
+FITTING_ROUNDS, MIN_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # a round size is tried if it is this close to the fitted one (relative)
-FEW = 3  # an explanation must reproduce at least this many printed numbers, or all of them
+MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all of them
 MUCH_CLOSER = 5.0  # a cause must bring gaits this many times closer to be reported
 READINGS = 3  # number of other conventions in which we search for mistakes
 # conventions that miss by up to this many times as much as the nearest one are ranked by their number of changes
-NEARLY = 4.0
+NEAR_FACTOR = 4.0
 CONVERGED: Final = 1e-6  # a fit ends when its value changes by less than this (relative)
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
@@ -60,7 +60,7 @@ def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
     """Yield walkers with one parameter changed as a misprint could change it."""
     values = parameters(config)
     for key, value in values.items():
-        for other, how in misprinted(key, value, values):
+        for other, how in list_misprints(key, value, values):
             walker = walker_with(config, key, other)
             if walker is not None:
                 yield Candidate("misprint", f"{key} is {short_number(other)} ({how})", walker)
@@ -81,14 +81,14 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
     return walker if turns and walker.leg_length > walker.radius >= 0.0 < walker.gravity else None
 
 
-def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
+def list_misprints(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
     """Return the values that may have been misprinted as `value`, each with a description of the misprint.
 
     values  parameters of the config, one of which may have been printed for another
     """
     unit = UNIT.findall(key)
     found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
-    found |= dict.fromkeys(transposed(value), "two digits are transposed")
+    found |= dict.fromkeys(transpose_digits(value), "two digits are transposed")
     found |= {float(f"{value * factor:.12g}"): "a factor of ten" for factor in (0.1, 10.0)}
     if key == SLOPE:
         found[math.radians(value)] = "degrees as radians"
@@ -97,7 +97,7 @@ def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tupl
     return [(other, how) for other, how in found.items() if other != value]
 
 
-def transposed(value: float) -> Iterator[float]:
+def transpose_digits(value: float) -> Iterator[float]:
     """Yield the numbers that differ from `value` by an exchange of two neighbouring digits."""
     text = short_number(value)
     for place, (first, second) in enumerate(pairwise(text)):
@@ -171,7 +171,7 @@ class Question:
         if self.reproduced(gait, self.state_items) != self.state_items:
             return None
         reproduced = self.reproduced(gait, self.items)
-        enough = len(reproduced) >= min(FEW, len(self.items))
+        enough = len(reproduced) >= min(MIN_REPRODUCED, len(self.items))
         return self.explanation(candidate.kind, candidate.what, reproduced) if enough else None
 
     def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
@@ -227,23 +227,23 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
     # Almost any cause can explain a single number.
     if sum(item.printed.bounds is None for item in question.items) < 2:
         return [], None
-    if found := [*conventions(question), *misprinted_values(question)]:
+    if found := [*find_conventions(question), *find_misprinted_value(question)]:
         return found, None
-    attempts = [*attempts_at(question)]
-    found = [*find_strike_at_start(question), *explained(question, attempts)]
+    attempts = [*attempt_all(question)]
+    found = [*find_strike_at_start(question), *explain_by_gaits(question, attempts)]
     if not found:
-        for changes, reading in closer_readings(question):
-            for each in explained(reading, attempts_at(reading)):
+        for changes, reading in find_closer_readings(question):
+            for each in explain_by_gaits(reading, attempt_all(reading)):
                 if len(each.reproduces) == len(question.items):
                     found.append(replace(each, what=f"{changes}, and {each.what}"))
             if found:
                 break
     most = max((len(each.reproduces) for each in found), default=0)
     complete = [each for each in found if len(each.reproduces) == most]
-    return complete, None if complete else closest(question, attempts)
+    return complete, None if complete else find_closest(question, attempts)
 
 
-def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
+def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
     """Yield an explanation for each attempt whose gait supports one. A mistake tried at several sizes counts once."""
     families: set[str] = set()
     for candidate, gait in attempts:
@@ -253,7 +253,7 @@ def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt
             families |= {candidate.family} - {""}
 
 
-def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
+def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     """Yield conventions that fit the printed values better than the stated one, and the question in each of them.
 
     A convention must bring the right gait much closer to the printed values. If it puts both feet on the slope and the
@@ -274,14 +274,14 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     standing = [(miss, other) for miss, other in readings.values() if other.stands(walker, items)]
     gain = 1.0 if standing and not question.convention.stands(walker, items) else MUCH_CLOSER
     closer = [(miss, other) for miss, other in standing or readings.values() if miss * gain < far]
-    near = NEARLY * min((miss for miss, _ in closer), default=0.0)
+    near = NEAR_FACTOR * min((miss for miss, _ in closer), default=0.0)
     closer.sort(key=lambda each: (len(each[1].differences(question.convention)), each[0]))
     for other in [other for miss, other in closer if miss <= near][:READINGS]:
         state = other.read(walker, [item.value for item in items], plain.full_state(walker, question.right.start))
         yield join_words(other.differences(question.convention)), replace(question, convention=other, state=state)
 
 
-def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
+def find_closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
     """Return the cause that comes closest to the printed values, or None if it is not much closer than the gait."""
     if not question.quick_items:
         return None
@@ -293,7 +293,7 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
     return {"kind": candidate.kind, "what": candidate.what, "miss_in_units": miss, "without_in_units": without}
 
 
-def attempts_at(question: Question) -> Iterator[Attempt]:
+def attempt_all(question: Question) -> Iterator[Attempt]:
     """Yield the most promising candidates with their gaits, then mistakes of fitted size with theirs."""
     right = question.guess(question.walker)
     guesses = []
@@ -302,12 +302,12 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     candidates += generate_misprints(question.config)
     for place, candidate in enumerate(candidates):
         guess = question.guess(candidate.walker)
-        if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
+        if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_GUESS, SAME_GUESS)):
             guesses.append((question.miss(guess, question.quick_items), place, guess))
     # The index decides between equal distances, because guesses cannot be compared.
-    for _, place, guess in heapq.nsmallest(REFINED, guesses):
+    for _, place, guess in heapq.nsmallest(MAX_SOLVED, guesses):
         yield from question.attempt(candidates[place], guess)
-    if len(question.items) < FEW:
+    if len(question.items) < MIN_REPRODUCED:
         return
     for mistake in filter(attrgetter("first"), mistakes):
         for size in sizes_to_try(question, mistake):
@@ -359,7 +359,7 @@ def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
     Yield nothing if the mistake does not come much closer than the right gait.
     """
     fitted = fit(question, mistake.of_size, 0.0, mistake.first, mistake.limits)
-    if fitted is None or fitted.left * LEAST_GAIN > fitted.without:
+    if fitted is None or fitted.left * MIN_GAIN > fitted.without:
         return
     size = fitted.value
     power = 10.0 ** math.floor(math.log10(size))
@@ -382,13 +382,13 @@ def find_strike_at_start(question: Question) -> Iterator[Explanation]:
         yield question.explanation("mistake", what)
 
 
-def conventions(question: Question) -> Iterator[Explanation]:
+def find_conventions(question: Question) -> Iterator[Explanation]:
     """Yield other conventions under which the right gait has every printed digit.
 
     Only those with the fewest changes are kept.
     """
     found: dict[str, int] = {}
-    for what, walk in scenes(question):
+    for what, walk in list_right_gaits(question):
         for other in (question.convention, *alternatives(question.convention)):
             changes = [*([what] if what else []), *other.differences(question.convention)]
             if not changes or len(changes) > min(found.values(), default=math.inf):
@@ -401,7 +401,7 @@ def conventions(question: Question) -> Iterator[Explanation]:
             yield question.explanation("convention", what)
 
 
-def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
+def list_right_gaits(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield right gaits with the change that each needs: none, or another reading of the stated leg length.
 
     The leg length may have been meant to include the foot's radius, or to exclude it.
@@ -419,7 +419,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
             yield f"the stated leg length {how} the foot's radius", gait
 
 
-def misprinted_values(question: Question) -> Iterator[Explanation]:
+def find_misprinted_value(question: Question) -> Iterator[Explanation]:
     """Yield the explanation that one value has a wrong sign or two exchanged digits.
 
     All other values must be right. Multipliers do not count.
@@ -436,7 +436,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
-    elif any(item.fits(right + printed - other) for other in transposed(printed)):
+    elif any(item.fits(right + printed - other) for other in transpose_digits(printed)):
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 

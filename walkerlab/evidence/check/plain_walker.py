@@ -89,7 +89,9 @@ class PlainWalker:
     # weights of trailing and leading rate in an extra term I * rate of the strike's balance
     extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
-    turned_on_it: bool = False  # whether the trailing leg turned about the same point of its foot before the strike
+    turned_about_strike_foot: bool = (
+        False  # whether the trailing leg turned about the same point of its foot before the strike
+    )
     strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
     window: float = 0.0  # rad, how early a touch is accepted
     euler_step: float = 0.0  # s, step of Euler's method; 0 for exact integration
@@ -261,7 +263,7 @@ def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats
     Z = REDUCTIONS[BENT if walker.free_at_strike else STRAIGHT]
     old_angles, old = walker.bodies(STRAIGHT, before)
     foot, radius = (walker.foot, walker.radius) if walker.strike_foot is None else (walker.strike_foot, 0.0)
-    pivot = (foot, radius) if walker.turned_on_it else (walker.foot, walker.radius)
+    pivot = (foot, radius) if walker.turned_about_strike_foot else (walker.foot, walker.radius)
     moving = walker.levers_about(*pivot) * np.exp(1j * old_angles) @ old
     # The legs exchange their roles, and the new swing leg is straight.
     angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
@@ -533,7 +535,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
         for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
             what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
             yield mistake(what, strike_foot=point)
-            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
+            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_about_strike_foot=True)
     if right.hip_mass:
         yield mistake("the hip's mass counts once for each leg", hip_mass=2.0 * right.hip_mass)
     early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"

@@ -200,7 +200,7 @@ def moment_of(push_off: float, moving: Moving) -> float:
     return float(moving.contact[1] * along - moving.contact[0] * up)
 
 
-def energy_won(before: Sequence[Moving], after: Sequence[Moving]) -> float:
+def energy_gain(before: Sequence[Moving], after: Sequence[Moving]) -> float:
     """Return the largest gain of kinetic energy (J) in a heel strike, or 0 if all of them lose energy."""
     return max(0.0, *(new.kinetic - old.kinetic for old, new in zip(before, after, strict=True)))
 
@@ -271,11 +271,11 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         samples = scene.walk(start, steps, tolerances, add_midpoints(grid)).samples
         assert samples is not None, "the walk is sampled"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
-        change = unsettled(samples.time_s, rates)
-        wanting = change > SETTLED_IMPULSE_SHARE / grid.size
-        if not wanting.any() or grid.size > MAX_INTERVALS:
+        change = integration_errors(samples.time_s, rates)
+        unsettled = change > SETTLED_IMPULSE_SHARE / grid.size
+        if not unsettled.any() or grid.size > MAX_INTERVALS:
             break
-        grid = split(samples.time_s, wanting)
+        grid = split(samples.time_s, unsettled)
     assert samples is not None, "the walk is sampled"
     momenta = momentum(samples, config) / scale
     differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
@@ -316,7 +316,7 @@ def impulse(times: Floats, rate: Floats) -> Floats:
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
 
 
-def unsettled(times: Floats, rate: Floats) -> Floats:
+def integration_errors(times: Floats, rate: Floats) -> Floats:
     """Estimate the error of each interval by Simpson's rule minus the midpoint rule, in the worst component."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
@@ -446,7 +446,7 @@ class RigidStart(CaseStart):
         distance = feet_off_the_slope(before) / self.walker.leg_length
         momentum_change = strikes.momentum_change(before, after, pushes)
         # Push-offs may add energy.
-        gain = 0.0 if any(pushes) else energy_won(before, after) / self.energy
+        gain = 0.0 if any(pushes) else energy_gain(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
             "momentum changed by a heel strike": momentum_change,
