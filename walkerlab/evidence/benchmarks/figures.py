@@ -30,7 +30,7 @@ class Series:
     """Runs of one method, or of one integrator or contact model of an engine, from coarse to fine."""
 
     look: Look
-    runs: Mapping[str, Array]  # stored columns by name; gaps are NaN
+    runs: Mapping[str, Array]  # stored columns by name, NaN for missing values
     filled: bool  # whether markers are filled
     engine: str = ""  # empty for methods
 

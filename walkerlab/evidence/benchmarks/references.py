@@ -86,7 +86,7 @@ class End:
 
     method: str
     state: Floats
-    tolerance: float = 0.0  # relative tolerance; 0 for Taylor series at machine precision
+    tolerance: float = 0.0  # relative tolerance, or 0 for Taylor series at machine precision
     rhs_evaluations: int = 0  # 0 if they are not counted
 
     def pack(self) -> Numbers:

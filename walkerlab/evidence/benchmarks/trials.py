@@ -100,7 +100,7 @@ ATOL_PER_RTOL = 1e-2
 @dataclass(frozen=True)
 class TrialRun:
     outcome: str
-    state: Floats  # end state; empty if it was not reached
+    state: Floats  # end state, empty if it was not reached
     rhs_evaluations: int
     accepted: int
     rejected: int
@@ -198,7 +198,7 @@ def contact_trial(
 ) -> ContactTrial:
     """Set up the walk with the contact of the config.
 
-    length_m   step length (m) of the rigid gait; it also replaces that of the contact gait
+    length_m   step length (m) of the rigid gait, also used for that of the contact gait
     asymmetry  as in `contact_scene`
     """
     scene = contact_scene(config, length_m, length_m, asymmetry)

@@ -55,7 +55,7 @@ CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
 """Choices that make up a convention: for each, a clause about it, and the words that its values put in there."""
 BEFORE: Instant = "before-strike"
 Values = dict[str, complex | None]
-"""Values of printed numbers by name; None for a number that the gait does not have."""
+"""Values of printed numbers by name, or None for a number that the gait does not have."""
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Exponent of 1/s in the unit of a quantity."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
@@ -80,7 +80,7 @@ class Convention:
     layout: str
     instant: Instant
     steps: int = 1  # steps that a printed period, length or multiplier belongs to
-    time: str = ""  # unit of time, or the gravity that was used; empty for seconds and the gravity of the config
+    time: str = ""  # unit of time, or gravity that was used. Empty for seconds and the config's gravity
 
     def rows(self, bodies: int) -> Floats:
         """Return the matrix (printed angles, bodies) that converts the absolute angles of all bodies into printed ones.

@@ -39,7 +39,7 @@ SHANK = 2
 TORSO = 3
 ROLLING = 4
 EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first guesses
-LONGEST_SWING = 12.0  # sqrt(L/g); a swing that lasts longer is given up
+LONGEST_SWING = 12.0  # sqrt(L/g), after which a swing is given up
 FALLEN = 1.5  # rad, angle of the stance leg at which the walker has fallen
 MAX_EULER_STEPS = 400_000
 LARGEST_STEP = 0.3  # sqrt(L/g), largest step of the integration
@@ -72,7 +72,7 @@ class PlainWalker:
     """A walker on its slope, and the mistakes in its equations. SI units."""
 
     parts: tuple[LegPart, LegPart]  # parts of one leg: thigh and shank, or the whole leg and NO_PART
-    knee: complex  # m, from hip to knee; 0 for straight legs
+    knee: complex  # m, from hip to knee, or 0 for straight legs
     hip_mass: float
     foot: complex  # m, from hip to the centre of the foot's arc, leg upright
     radius: float
@@ -94,7 +94,7 @@ class PlainWalker:
     )
     strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
     window: float = 0.0  # rad, how early a touch is accepted
-    euler_step: float = 0.0  # s, step of Euler's method; 0 for exact integration
+    euler_step: float = 0.0  # s, step of Euler's method, or 0 for exact integration
     interpolates: bool = True  # whether Euler's method finds the strike between two steps
     evens_angles: bool = False  # whether a touch within the window puts both feet on the slope
 
@@ -500,10 +500,10 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
 class Mistake(NamedTuple):
     """A mistake known from publications and programs."""
 
-    what: str  # completes the sentence 'All printed values follow if ...'; {} stands for the size
+    what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
     of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
     first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest size; smaller ones hide in a program's errors
+    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest size: smaller ones hide in errors of a program
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:

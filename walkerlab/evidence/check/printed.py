@@ -112,7 +112,7 @@ class Item(PrintedNumber):
 
     name: str  # such as period_s, state.stance_angle or multipliers.1
     quantity: str  # the name without the part after the dot
-    place: int  # index in the list of this quantity; 0 for a single value
+    place: int  # index in the list of this quantity, or 0 for a single value
     text: str
 
 
@@ -189,7 +189,7 @@ def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> 
     """List the printed numbers.
 
     printed  texts by quantity, each a single text or a list
-    names    names of the components of a list, by quantity; other components are numbered
+    names    names of the components of a list, by quantity. Other components are numbered
     """
     items = []
     for quantity, texts in printed.items():

@@ -88,8 +88,8 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 class Comparison:
     """Difference between the walks of both models."""
 
-    errors: Errors  # differences by alignment; alignments that cannot be compared are absent
-    orbit: list[float] | None = None  # distance between the two orbits, by leg; None if no stride was completed
+    errors: Errors  # differences by alignment, without alignments that cannot be compared
+    orbit: list[float] | None = None  # distance between the two orbits, by leg, or None if no stride was completed
     groups: Mapping[str, Group] = field(default_factory=dict)
     left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
 

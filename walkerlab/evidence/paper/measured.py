@@ -123,10 +123,10 @@ class ContactMeasurements:
     law: Contact  # contact block of the config
     foot_radius: float  # m
     summary: Mapping[str, Any]  # stored summary of the walk
-    start: State | None  # initial rigid state, rad and rad/s; None if states were not stored
+    start: State | None  # initial rigid state, rad and rad/s, or None if states were not stored
     table_3: Characteristics
-    step_length: float | None  # m, mean over the last completed stride; None if no stride was completed
-    energy: EnergyRecord | None  # energy over the last five steps; None if energies were not stored
+    step_length: float | None  # m, mean over the last completed stride, or None if no stride was completed
+    energy: EnergyRecord | None  # energy over the last five steps, or None if energies were not stored
     from_x_p: tuple[int, str]  # walk of up to ten steps from the printed x_p: completed steps and outcome
 
     @property
@@ -233,7 +233,7 @@ class AdamsStart:
     energy: float  # J, kinetic plus potential energy, with heights measured from the stance foot
     weight: float  # N
     normal_force: float  # N, normal force of the ground at the start
-    pull_from: float | None  # s, time from which the ground would have to pull; None if never
+    pull_from: float | None  # s, time from which the ground would have to pull, or None if never
     heel_strikes: int  # number of heel strikes in the walk
     end: str  # outcome of the walk
     end_time: float  # s
@@ -246,7 +246,7 @@ class AdamsWalk:
     terrain: str  # terrain of the contact model
     rigid: AdamsStart  # walk of the rigid model from the same start, both feet on the config's slope
     walk: ContactWalkResult
-    airborne_from: float | None  # s, first time at which no foot of the contact model touches the ground; None if never
+    airborne_from: float | None  # s, first time at which no foot touches the ground, or None if one always does
     # N, largest normal force of the contact model after the rigid model's ground would have to pull
     later_normal_force: float | None
     normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model

@@ -275,7 +275,7 @@ class TuneRun:
     walks       walks of the procedure: `hinged`, with the first stance foot pinned; `released`, with both feet free;
                 and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks
-    adjustment  smallest change of the velocities with which the contact model walks; None if it never walks
+    adjustment  smallest change of the velocities with which the contact model walks, or None if it never walks
     """
 
     def __init__(self, config: TuneConfig, scene: contact.ContactScene, rigid_state: State, gait: GaitAnswer) -> None:

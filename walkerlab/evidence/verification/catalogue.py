@@ -128,7 +128,7 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
 
 
 B = TypeVar("B", bound=Block)
-# leg (m), mass (kg) and gravity (m/s^2) of the twin; the values are uneven, so that its rounding errors differ
+# leg (m), mass (kg) and gravity (m/s^2) of the twin, with uneven values so that rounding errors differ
 TWIN_LEG = 1.37
 TWIN_MASS = 11.3
 TWIN_GRAVITY = 7.43

@@ -72,7 +72,7 @@ class Choice:
     case: str
     method: str
     verdict: str  # fine, wrong silently, gives up, diverges
-    error: float | None  # error of the final state; None if the method gave up or diverged
+    error: float | None  # error of the final state, or None if the method gave up or diverged
     rhs_evaluations: int
     wall_s: float
 
@@ -198,7 +198,7 @@ TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # walks of more steps are not sampled
 LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
 """Methods of libraries, tried if ours fail. The multistep method comes first, because ours are one-step methods."""
-LIBRARY_BUDGET: Final = 30_000  # right-hand sides; small, because the libraries' solvers run in Python
+LIBRARY_BUDGET: Final = 30_000  # right-hand sides, few because the solvers of libraries run in Python
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class CaseCell:
     """A case to judge and to simulate with ordinary methods. This may happen in another process."""
 
     case: Case
-    config: Config | None = None  # config of a variation of a scene; None if the case changes the paper config
+    config: Config | None = None  # config of a variation of a scene, or None if the case changes the paper config
 
     def run(self) -> tuple[CaseResult | Choice, ...]:
         """Return the judgement, then the results of the ordinary methods."""

@@ -408,7 +408,7 @@ class CaseStart:
     residual_name: ClassVar[str]  # description of `JudgedWalk.residual_J`
     config: WalksConfig
     start: State
-    energy: float  # J, m g L plus kinetic and elastic energy at the start; residuals are divided by it
+    energy: float  # J, m g L plus kinetic and elastic energy at the start, by which residuals are divided
 
     def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk. It keeps all its steps, because outcomes are compared, too."""

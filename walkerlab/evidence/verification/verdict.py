@@ -54,7 +54,7 @@ class CaseResult:
     wall_s: float = 0.0
     findings: tuple[Measure, ...] = ()  # measures taken
     remarks: tuple[str, ...] = ()  # descriptions of further faults
-    second_method: str = ""  # second method, for comparison; empty if no other method had an answer
+    second_method: str = ""  # method of the second walk, empty if no other method had an answer
     second_tried: str = ""  # failed methods with their outcomes, or the reason why none was tried
     not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be taken
 

@@ -41,7 +41,7 @@ class Stepping:
     """Integrator and step control of an engine's run."""
 
     integrator: str
-    step_s: float  # step size; the largest one if steps are adaptive
+    step_s: float  # step size, or the largest one if steps are adaptive
     tolerance: float | None = None  # None for fixed steps
 
 

@@ -170,7 +170,7 @@ class EngineExperiment:
     engine: str
     version: str
     experiment: str
-    truth: Truth | None = None  # reference for the runs; None if they are not compared
+    truth: Truth | None = None  # reference for the runs, or None if they are not compared
 
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
@@ -270,7 +270,7 @@ class EngineOnScene:
         """Simulate a walk of at most `max_steps` engine steps.
 
         label   name of the integrator or contact model in the row
-        native  the engine's native contact; None for our law
+        native  the engine's native contact, or None for our law
         start   factor on the gait's initial velocities
         """
         law, until_s = (SAME_LAW, self.truth.until_s) if native is None else (OWN_LAW, UNLIMITED_S)

@@ -88,7 +88,7 @@ class RuleFollower:
     def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
         """Start a walk of at most `steps` steps with both feet on the ground.
 
-        carries  whether our contact law acts; otherwise the engine uses its native contact, and we apply only drives
+        carries  whether our contact law acts. If not, the engine uses native contact, and we apply only drives
         """
         self.walk_state = new_walk_state(scene.ours, scene.ground, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)

@@ -28,7 +28,7 @@ class EngineRow:
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
-    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop; None if the process was lost
+    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop, or None if the process was lost
     period_s: Annotated[float | None, Label("s", "period of the last step")]
     step_length_m: Annotated[float | None, Label("m", "length of the last step")]
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]

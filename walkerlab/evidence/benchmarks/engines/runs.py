@@ -29,10 +29,10 @@ class WalkAnswer:
     """Result of a walk in an engine."""
 
     outcome: str
-    end: Floats | None  # final state of the free walker; None unless the walk was completed
+    end: Floats | None  # final state of the free walker, or None unless the walk was completed
     touches_s: Floats  # (steps,) touch times
     along_m: Floats  # (steps,) positions of the footholds along the slope
-    slips_m: Floats  # (steps,) net slips; without that of the last step if its foot has not lifted
+    slips_m: Floats  # (steps,) net slips, without that of the last step if the foot has not lifted
     steps: int  # engine steps
     time_s: float  # simulated time
     wall_s: float  # processor time of the loop
@@ -47,7 +47,7 @@ class WalkTask:
     scene: EngineScene
     touches: int  # number of touches after which the walk ends
     until_s: float  # time at which the walk ends at the latest
-    own: OwnContact | None  # the engine's tuned contact; None for our law
+    own: OwnContact | None  # the engine's tuned contact, or None for our law
     max_steps: int  # step budget of the engine
 
     def run(self) -> WalkAnswer:
