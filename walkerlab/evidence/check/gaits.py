@@ -214,7 +214,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
-    """One step of a walker: a gait, or a first guess at one."""
+    """A step of a walker, which is a gait or a first guess of one."""
 
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike

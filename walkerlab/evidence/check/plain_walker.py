@@ -350,7 +350,7 @@ def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats |
 
 
 def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
-    """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
+    """Take a step from coordinates just after a heel strike. Return None if the walker does not complete it.
 
     start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
     """

@@ -37,7 +37,7 @@ class Printed(PrintedNumber):
         return self.value - half, self.value + half
 
     def agreement(self, value: float | None) -> str:
-        """Agreement of a value with the printed digits: 'rounded', 'cut off', or '' if it disagrees."""
+        """Return how a value agrees with the printed digits: 'rounded', 'cut off', or '' if it does not."""
         return "" if value is None else agreement(self.digits, value)
 
 

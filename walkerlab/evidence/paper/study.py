@@ -170,7 +170,7 @@ def study_the_paper() -> PaperStudy:
 def settle(walker: RigidWalker) -> State:
     """Return the stable gait on which walks from x_p settle.
 
-    Raises ArithmeticError if the walk ends before.
+    Raises ArithmeticError if the walk ends early.
     """
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), X_P_SETTLING_STEPS)
     if walk.steps < X_P_SETTLING_STEPS:

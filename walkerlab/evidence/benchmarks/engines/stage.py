@@ -66,7 +66,7 @@ THREE_DIGITS = 5e-4  # largest relative error of a value with three correct digi
 
 @dataclass
 class EngineFindings:
-    """Results of the stage, collected row by row."""
+    """Results of the stage, to which rows are added one by one."""
 
     rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
