@@ -181,7 +181,7 @@ ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_TRIAL_STEPS = 10
 CONTACT_TRIAL_STEPS = 10
 NEAR_RIGID_STEPS = 4
-SLOW_CONTACT_STEPS = 4  # steps of walkers other than the compass; their right-hand sides take several times as long
+SLOW_CONTACT_STEPS = 4  # for walkers other than the compass, whose right-hand sides take several times as long
 OMISSION_OFF_COMPASS = {
     "what": "accuracy of the scene contact-near-rigid",
     "why": "only the compass has it",

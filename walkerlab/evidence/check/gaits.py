@@ -60,7 +60,7 @@ POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Exponent of 1/s in the unit of a quantity."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
-# Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
+# Displacement (rad, and rad/s times sqrt(L/g)) for central differences: near the optimum for errors of `EXACT`.
 DIFFERENCE = 1e-6
 MAX_MOVES = 16  # iterations of Newton's method
 SMALLEST_MOVE = 1e-13  # a gait that moves by less over a step is accepted at once

@@ -38,7 +38,7 @@ STANCE = 1
 SHANK = 2
 TORSO = 3
 ROLLING = 4
-EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first guesses
+EXACT, QUICK = 1e-12, 1e-7  # relative tolerances for gaits and for first guesses
 LONGEST_SWING = 12.0  # sqrt(L/g), after which a swing is given up
 FALLEN = 1.5  # rad, angle of the stance leg at which the walker has fallen
 MAX_EULER_STEPS = 400_000
@@ -269,10 +269,10 @@ def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats
     angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
     places = walker.levers_about(foot, radius) * np.exp(1j * angles)
     inertias = walker.inertias * [*[walker.strike_inertia] * 3, 1.0, 0.0]
-    # The masses of both legs change places, as their angles do above.
+    # The angles of the legs changed places above, so the masses must do so, too.
     momentum = (places.conj().T * walker.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
     if walker.push_off:
-        # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
+        # The impulse acts along the trailing leg through the hip. It pushes only the hip, which moves with the stance leg.
         to_hip = -walker.foot * cmath.exp(1j * angles[SWING]) + 1j * walker.radius
         hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
         momentum[STANCE] += walker.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real

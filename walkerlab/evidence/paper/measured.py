@@ -45,7 +45,7 @@ class Characteristics:
     t_right: float | None  # period of the second step of that stride
     t_cycle: float | None  # sum of both periods
     v_com: float | None  # length of that stride along the slope, divided by t_cycle
-    # time mean of kinetic plus potential energy over several steps, with heights measured from the current stance foot
+    # time mean of kinetic and potential energy over several steps, with heights from the current stance foot
     E_avg: float | None
 
 

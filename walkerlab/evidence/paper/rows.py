@@ -219,7 +219,7 @@ class Judge:
         values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in values.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
-        # The two step periods can only be judged together, so the evidence shows both.
+        # Both step periods are wrong for the same reason, so the evidence shows both.
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]

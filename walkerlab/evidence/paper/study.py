@@ -132,7 +132,7 @@ class PaperStudy:
     swing_foot_height: float  # m, height above the slope at which (A.55) as printed places the swing foot of x_p
     foothold_speed: float  # m/s, speed of the new stance foot if the printed gait's impact uses (A.55) as printed
     both_misprints: State | None  # fixed point near x_p with the misprints of (A.5) and (A.55), or None
-    # J, kinetic energy of one state: from the velocities of the masses, and from D_e with either order of coordinates
+    # J, kinetic energy of one state, from the masses and from D_e with either order of coordinates
     kinetic_energy: Mapping[str, float]
     adams: AdamsStart
 

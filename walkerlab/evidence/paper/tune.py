@@ -159,7 +159,7 @@ def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Pro
     series: dict[str, list[Distance]] = {}
     for name in compared:
         walker = scene.walker
-        if name != ALL_SERIES:  # point feet, as in the rigid model
+        if name != ALL_SERIES:  # the series with point feet, as in the rigid model
             points = config.walker.model_copy(update={"foot_radius_m": 0.0})
             rules = knee_rules(config.walker)
             laws = walker.normal, walker.friction

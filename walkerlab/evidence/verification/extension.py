@@ -20,7 +20,7 @@ def cases_config(config: reads.SceneConfig) -> type:
 
 def paper_walks(_config: object) -> dict[str, Any]:
     """Return the part of the paper's config that the cases depend on."""
-    # imported here, because the command line's help does not need it
+    # Imported here, because the help of the command line would otherwise load it.
     from walkerlab.config.loader import paper_config_with
 
     return {"paper": reads.slice_of(paper_config_with({}), reads.WalksConfig)}

@@ -141,7 +141,7 @@ def solve_problem(
     try:
         value = run()
     except ArithmeticError:
-        # Far beyond any limit, but finite, because a result holds no infinity.
+        # This is far beyond any limit, but finite, because results must not contain infinity.
         value = math.copysign(1e300, reference)
     return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
 
@@ -162,7 +162,9 @@ def bouncing_ball_period() -> float:
     # In flight the time of the next landing follows exactly, so the run ends there.
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
-    in_flight = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY  # until the next landing
+    in_flight = (
+        rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)
+    ) / EARTH_GRAVITY  # time until the next landing
     return (float(run.times[-1] + in_flight) - first) / BOUNCES
 
 

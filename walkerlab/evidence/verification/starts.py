@@ -263,7 +263,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
     if scene.walker.whole.push_off != 0.0:
-        # A short pulse must not lie between two points of the grid.
+        # A short pulse could lie between two points of the grid and be missed.
         pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
         pushed = (walk.touch_time_s[:, None] + pulse).ravel()
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])

@@ -33,10 +33,10 @@ DIVERGED_M = 1e4  # a run with a foot farther away than this has diverged
 
 @dataclass(frozen=True, order=True)
 class Turn:
-    """Lock or release of a knee within a step."""
+    """Lock or release of a knee within an engine step."""
 
-    share: float  # fraction of the step at which it occurs
-    event: int  # index of its event function
+    share: float  # fraction of the engine step at which it occurs
+    event: int  # index of the event function that detects it
 
 
 Bend = tuple[float, float]
