@@ -272,7 +272,7 @@ def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats
     # The angles of the legs changed places above, so the masses must do so, too.
     momentum = (places.conj().T * walker.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
     if walker.push_off:
-        # The impulse acts along the trailing leg through the hip. It pushes only the hip, which moves with the stance leg.
+        # The impulse acts along the trailing leg, so it pushes only the hip, which moves with the stance leg.
         to_hip = -walker.foot * cmath.exp(1j * angles[SWING]) + 1j * walker.radius
         hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
         momentum[STANCE] += walker.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real

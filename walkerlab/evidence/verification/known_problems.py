@@ -162,10 +162,8 @@ def bouncing_ball_period() -> float:
     # In flight the time of the next landing follows exactly, so the run ends there.
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
-    in_flight = (
-        rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)
-    ) / EARTH_GRAVITY  # time until the next landing
-    return (float(run.times[-1] + in_flight) - first) / BOUNCES
+    until_landing = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY
+    return (float(run.times[-1] + until_landing) - first) / BOUNCES
 
 
 def restitution(law: Impact, speed: float) -> float:

@@ -47,7 +47,7 @@ class CaseResult:
     model: str
     reason: str
     expected: tuple[str, ...]
-    outcome: Annotated[str, Label("", "how it ended")]
+    outcome: Annotated[str, Label("", "how the case ended")]
     steps: Annotated[int, Label("1", "steps walked")] = 0
     energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")] = 0.0  # noqa: N815
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")] = 0
@@ -65,7 +65,7 @@ class CaseResult:
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 
     @property
-    def ok(self) -> Annotated[bool, Label("1", "whether it ended as expected and passed every measure")]:
+    def ok(self) -> Annotated[bool, Label("1", "whether the case ended as expected and passed every measure")]:
         return not self.failures
 
 
