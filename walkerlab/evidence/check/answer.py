@@ -23,9 +23,8 @@ from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
 
-# The two routes agree, and two gaits are the same, if they differ by less than this (in units in which L and g are 1).
-SAME_ROUTE: Final = 1e-10
-SAME_GAIT: Final = 1e-6
+SAME_ROUTE: Final = 1e-10  # the two routes agree if they differ by less than this, with L and g of 1
+SAME_GAIT: Final = 1e-6  # starts that differ by less than this belong to the same gait
 SMALL_VALUE: Final = 1e-3  # differences are relative for printed values above this, and absolute below
 GAIT_VALUES: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",

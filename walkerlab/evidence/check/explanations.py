@@ -182,7 +182,7 @@ class Question:
     def misses(self, walker: PlainWalker | None) -> Floats | None:
         """Return how far a walker's first guess is from each printed value: signed, in units of its last digit.
 
-        None if there is no first guess, or fewer than two values to compare.
+        Return None if there is no first guess, or if there are fewer than two values to compare.
         """
         walk = None if walker is None else self.guess(walker, EXACT)
         if walk is None:
@@ -195,7 +195,7 @@ class Question:
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a first guess of a walker's gait, by a Newton step from the printed state or, if none, the right gait.
 
-        None if that leads nowhere.
+        Return None if that leads nowhere.
         """
         start = (
             self.right.start if self.state is None else plain.start_from(walker, self.state, self.convention.instant)

@@ -1,9 +1,9 @@
 """A plain model of a walker: a second route to its gaits, in which known mistakes can be switched on.
 
 It shares no equations with the compiled model. It derives Lagrange's equations from point masses, whose velocities are
-linear in the rates of the bodies. Heel and knee strikes are balances of angular momentum. All
-positions are complex numbers in the slope's frame, real along the slope and imaginary along its normal, and angles are
-measured from the normal, counter-clockwise.
+linear in the rates of the bodies. Heel and knee strikes are balances of angular momentum. Positions are complex numbers
+in the frame of the slope: real along the slope, imaginary along its normal. Angles are measured from the normal,
+counter-clockwise.
 
 State of a walker: angles, then rates, of the swing leg (its thigh), the stance leg and, while its knee is free, the
 swing shank. A torso on the legs' bisector follows them.
@@ -89,9 +89,8 @@ class PlainWalker:
     # weights of trailing and leading rate in an extra term I * rate of the strike's balance
     extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
-    turned_about_strike_foot: bool = (
-        False  # whether the trailing leg turned about the same point of its foot before the strike
-    )
+    # whether the trailing leg turned about the same point of its foot before the strike
+    turned_about_strike_foot: bool = False
     strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
     window: float = 0.0  # rad, how early a touch is accepted
     euler_step: float = 0.0  # s, step of Euler's method, or 0 for exact integration
