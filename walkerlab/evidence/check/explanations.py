@@ -28,7 +28,7 @@ from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
 MAX_SOLVED: Final = 5  # number of candidates whose gaits are solved
-FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
+FARTHEST_GUESS = 0.3  # rad, distance from the printed state above which a first guess has no meaning
 SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
 # rounds in which the size of a mistake is fitted, and how many times closer the fit must bring gaits
 FITTING_ROUNDS, MIN_GAIN = 4, 3.0
@@ -459,5 +459,5 @@ def advise(explanations: Sequence[Explanation]) -> str:
     if len(explanations) < 2:
         return ""
     if {each.kind for each in explanations} == {"convention"}:
-        return "Several conventions fit; the source must say which of them it uses."
-    return "Several explanations fit; more printed digits, or another printed value, would decide between them."
+        return "Several conventions fit. The source must say which of them it uses."
+    return "Several explanations fit. More printed digits, or another printed value, would decide between them."

@@ -281,7 +281,7 @@ class CheckedStep:
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         """Return the state of all bodies at an instant of the step, or None if the step has no such instant.
 
-        vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
+        vertical  whether the stance leg is vertical in mid-stance. If not, it is normal to the slope
         """
         if instant != "mid-stance":
             return plain.full_state(self.walker, self.start if instant == "after-strike" else self.step.before)

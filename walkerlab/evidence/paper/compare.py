@@ -256,7 +256,7 @@ def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     }
 
 
-START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
+START_TOLERANCE = 1e-6  # rad and rad/s, distance from the fixed point above which a start counts as moved
 PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
     "why": "they apply only to the paper's walker on even ground",

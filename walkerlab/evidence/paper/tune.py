@@ -228,7 +228,9 @@ def limit_groups(findings: LimitFindings) -> dict[str, Group]:
         complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]
         if rows:
             of = [distance.setting for distance in complete or rows]
-            settings = rows_group(of, FACTOR_LABELS, SETTING, "number of the setting; the config's contact is first")
+            settings = rows_group(
+                of, FACTOR_LABELS, SETTING, "number of the setting, beginning with the config's contact"
+            )
             distances = columns(complete or rows, DISTANCE_LABELS | (WALK_LABELS if complete else {}), SETTING)
             path = f"limit/{name.replace(', ', '-').replace(' ', '-')}"
             groups[path] = Group({**settings.variables, **distances})

@@ -68,7 +68,9 @@ def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"Case names must differ; used more than once: {', '.join(doubled)}.", UNIQUE_NAME_ADVICE)
+        raise ConfigError(
+            f"Case names must differ, but these are used more than once: {', '.join(doubled)}.", UNIQUE_NAME_ADVICE
+        )
     return tuple(cases)
 
 

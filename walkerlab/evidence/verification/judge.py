@@ -313,7 +313,7 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
     """Simulate a walk with other methods until one of them has an answer.
 
-    budget  limit on right-hand sides; libraries may get fewer
+    budget  limit on right-hand sides, which may be lower for libraries
     walk    function that simulates the walk with a method and a budget
     """
     tried: list[str] = []

@@ -25,7 +25,7 @@ def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tup
     return (
         omission(
             "the named extreme cases",
-            "they are cases of the paper's compass; this walker has its own cases",
+            "they are cases of the paper's compass, and this walker has other ones",
             "about a hundred cases",
         ),
         omission("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),

@@ -120,7 +120,7 @@ def run(
 ) -> Content:
     """Compute the missing cells of both maps.
 
-    checkpoint  cells of earlier runs; new cells are added to it
+    checkpoint  cells of earlier runs, to which new cells are added
     jobs        number of processes
     """
     cells = config.stability.map_cells

@@ -386,7 +386,7 @@ class JudgedWalk:
     """Walk to be judged, in either model. Times are in pendulum times of the walker.
 
     touches     times of the heel strikes
-    end         end time; None in the rigid model, whose walks end at a heel strike
+    end         end time, or None in the rigid model, whose walks end at a heel strike
     residual_J  residual of the energy balance or, in the rigid model without springs, energy drift within a swing
     numbers     values that must be finite
     """

@@ -80,7 +80,7 @@ class RuleFollower:
 
     scene       scene with the currently locked knees
     walk_state  state of the walk apart from its coordinates
-    outcome     outcome of the walk; None while it continues
+    outcome     outcome of the walk, or None while it continues
     turn        lock or release of a knee within the last engine step, which is then discarded
     watches     whether locks and releases of knees are searched for
     """
