@@ -170,7 +170,7 @@ class Measured:
 
     @property
     def raised(self) -> list[float | None]:
-        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
+        """How much larger (%) each coordinate of the contact model's start is than that of the rigid gait."""
         gait = self.models.get(self.equations)
         start = self.contact.start
         if gait is None or start is None:
@@ -180,7 +180,7 @@ class Measured:
 
     @property
     def speed_differences(self) -> dict[str, float]:
-        """Difference (%) of the contact model's average velocity from the rigid model's, by set of equations."""
+        """Difference (%) of the average velocities of contact and rigid model, by set of equations."""
         contact = self.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.models.items()}
         return {
