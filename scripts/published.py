@@ -15,7 +15,7 @@ from walkerlab.config.loader import load
 from walkerlab.evidence.check.answer import Checked, check_gait
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker, list_mistakes
-from walkerlab.evidence.check.section import COLUMNS, headline, is_short, remarks, source_of
+from walkerlab.evidence.check.section import COLUMNS, headline, is_partly_reproduced, remarks, source_of
 from walkerlab.views.report.numbers import number
 
 ROOT = Path(__file__).parent.parent
@@ -160,7 +160,7 @@ def entry_of(file: Path) -> Entry:
         [column.title for column in COLUMNS], [[column.cell(row).text for column in COLUMNS] for row in rows]
     )
     reproduced = [row for row in rows if row["verdict"] == REPRODUCED]
-    short = sum(map(is_short, rows))
+    short = sum(map(is_partly_reproduced, rows))
     note = f", {short} of them not in all digits" if short else ""
     in_the_table = ("The right gait", "Two independent")
     return Entry(

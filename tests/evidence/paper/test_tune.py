@@ -76,7 +76,7 @@ def test_both_outcomes_of_the_adams_start_name_model_and_ground():
     start = small("paper").summary["paper_start"]
     rigid, contact = start["reason"].split("the contact model on ")
     assert "in the rigid model, whose stance foot is pinned to an even slope" in rigid
-    assert "with its foot held down the walk ends (fell) at 0.347 s" in rigid
+    assert "with the foot held down the walk ends (fell) at 0.347 s" in rigid
     assert contact.startswith("its checkerboard of pads, the ground, which cannot pull, carries no more than")
     assert f"and the walk ends at {start['end_time_s']:.3g} s" in contact
     assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact

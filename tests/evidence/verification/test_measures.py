@@ -16,7 +16,7 @@ from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.starts import (
     RigidMasses,
     case_tolerances,
-    energy_won,
+    energy_gain,
     feet_off_the_slope,
     prepare_start,
 )
@@ -74,8 +74,8 @@ def test_momentum_is_conserved_with_leg_inertia():
 
 def test_energy_gained_at_a_heel_strike_is_detected(walk):
     before, after = MASSES.poses(walk.before), MASSES.poses(walk.after)
-    assert energy_won(before, after) == 0.0
-    assert energy_won(after, MASSES.poses(walk.before[:, [1, 0, 3, 2]])) > 0.0
+    assert energy_gain(before, after) == 0.0
+    assert energy_gain(after, MASSES.poses(walk.before[:, [1, 0, 3, 2]])) > 0.0
     assert after[0].kinetic < before[0].kinetic
 
 

@@ -11,11 +11,11 @@ from walkerlab.evidence.verification.starts import (
     MEASURE,
     add_midpoints,
     impulse,
+    integration_errors,
     momentum_balance,
     momentum_finding,
     prepare_start,
     split,
-    unsettled,
 )
 from walkerlab.evidence.verification.verdict import NotMeasured
 
@@ -85,8 +85,8 @@ def test_simpson_sums_report_their_uncertainty():
     cubic = (times**3)[:, None]
     np.testing.assert_allclose(impulse(times, cubic)[:, 0], np.array([0.0, 1.0, 1.5, 4.0]) ** 4 / 4.0)
     kink = np.maximum(0.0, times - 1.25)[:, None]
-    assert unsettled(times, kink)[[0, 2]] == pytest.approx([0.0, 0.0])
-    assert unsettled(times, kink)[1] > 0.0
+    assert integration_errors(times, kink)[[0, 2]] == pytest.approx([0.0, 0.0])
+    assert integration_errors(times, kink)[1] > 0.0
 
 
 def test_uncertain_intervals_are_split_into_four():

@@ -11,7 +11,7 @@ from walkerlab.config.schema import Config
 from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scaled, scene_cases, to_twin
 from walkerlab.evidence.verification.judge import CaseCell
 from walkerlab.evidence.verification.stability import resolve_scene
-from walkerlab.evidence.verification.starts import RigidMasses, energy_won, feet_off_the_slope
+from walkerlab.evidence.verification.starts import RigidMasses, energy_gain, feet_off_the_slope
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units
@@ -109,7 +109,7 @@ def test_heel_strike_conserves_summed_momentum_of_any_walker(name):
     poses = masses.poses(before[None]), masses.poses(after[None])
     assert feet_off_the_slope(poses[0]) < 1e-12
     assert masses.momentum_change(*poses) < 1e-12
-    assert energy_won(*poses) == 0.0
+    assert energy_gain(*poses) == 0.0
     wrong = after.copy()
     wrong[after.size // 2 + STANCE] *= 1.0 + 1e-6
     assert masses.momentum_change(poses[0], masses.poses(wrong[None])) > 1e-8

@@ -1,4 +1,4 @@
-"""Stage `accuracy`: error against run time of every method on every scene, over a ladder of tolerances."""
+"""Stage `accuracy`: error and run time of every method on every scene, over a ladder of tolerances."""
 
 import platform
 import time
@@ -35,12 +35,12 @@ from walkerlab.scene.rigid import rigid_walker
 
 # The sizes of runs below are counted in right-hand sides.
 RUN_BUDGET = 200_000  # limit of a compiled run, so that hopeless runs end
-# A library's right-hand sides take a hundred times as long, because its steps run in Python.
-LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
-LAST_RUN_SIZE = 12_000  # size of a library's run after which its ladder ends
-WARM_UP_BUDGET = 2_000  # enough to compile and load everything
+# The steps of a library run in Python, so a right-hand side takes a hundred times as long.
+LIBRARY_RUN_BUDGET = 20_000  # limit of a run with a library
+LAST_RUN_SIZE = 12_000  # the ladder of a library ends after a run of this size
+WARM_UP_BUDGET = 2_000  # enough for everything to be compiled and loaded
 MAX_REPEATS = 7
-REPEAT_TIME_S = 0.2
+REPEAT_TIME_S = 0.2  # time for all repeats of a run
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 OUTCOME_LABELS = tuple(outcome.label for outcome in Outcome)
@@ -70,11 +70,11 @@ class MethodRun:
 
 @dataclass(frozen=True)
 class Ascent:
-    """Runs of one method over its ladder of tolerances."""
+    """Runs of one method on one scene, from loose to tight tolerance."""
 
     trial: Trial
     method: str
-    ladder: tuple[float, ...]
+    ladder: tuple[float, ...]  # all tolerances, including those that were not run
     runs: tuple[MethodRun, ...]
 
 
@@ -102,12 +102,12 @@ class MethodRow:
 
 
 def unit_name(*parts: object) -> str:
-    """Name a measurement in a checkpoint. Names contain the machine, because run times are comparable only on one."""
+    """Name a measurement in a checkpoint. Run times of different machines differ, so the name contains the machine."""
     return "/".join(map(str, (platform.node(), *parts)))
 
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
-    """Run a method at tighter and tighter tolerances until a run is too expensive. Resume runs of the checkpoint."""
+    """Run a method at tighter and tighter tolerances until it is too expensive. Runs in the checkpoint are reused."""
     ladder = OWN_LADDER
     budget = RUN_BUDGET
     last = RUN_BUDGET
@@ -129,7 +129,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
-    # the first walk serves as a warm-up and counts only if it is long
+    # The first walk also loads data into caches, which does not matter for a long walk, so only then does it count.
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -181,17 +181,17 @@ ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_TRIAL_STEPS = 10
 CONTACT_TRIAL_STEPS = 10
 NEAR_RIGID_STEPS = 4
-SLOW_CONTACT_STEPS = 4  # steps of walkers other than the compass; their right-hand sides take several times as long
+SLOW_CONTACT_STEPS = 4  # for walkers other than the compass, whose right-hand sides take several times as long
 OMISSION_OFF_COMPASS = {
     "what": "accuracy of the scene contact-near-rigid",
     "why": "only the compass has it",
     "saves": "a minute",
 }
-START_RATE_FACTOR = 0.98  # factor on the gait's angular velocities, so that no step repeats the previous one
+START_RATE_FACTOR = 0.98  # factor on the velocities of the gait: on the gait itself, all steps would be the same
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
-    """Measure every method on every scene, one run after another, because run times are compared."""
+    """Measure every method on every scene. Run times are compared, so no two runs take place at once."""
     left_out: list[dict[str, Any]] = pinning_left_out(config, "methods")
     if config.contact is not None and not is_passive_compass(config):
         left_out.append(dict(OMISSION_OFF_COMPASS))
@@ -221,7 +221,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def resumed_end(trial: Trial, name: str, compute: Callable[[Trial], End], checkpoint: Checkpoint) -> End:
-    """Return an end state from the checkpoint, or compute and keep it.
+    """Return an end state from the checkpoint, or compute it and add it there.
 
     Raises WalkEndsError if the walk ends early.
     """
@@ -280,7 +280,7 @@ def summarise(
 
 
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Return each method's fastest run with an error of at most `level` on a scene, fastest method first."""
+    """Return for each method the fastest run on a scene with an error of at most `level`, the fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
@@ -295,7 +295,7 @@ def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
 
 
 def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
-    """Return a sentence on the fastest method at each error level and its lead over the best library."""
+    """Return a sentence on which method is fastest at each error level, and by how much it beats the best library."""
     levels = []
     for level in ERROR_LEVELS:
         runs = good_enough(rows, scene, level)

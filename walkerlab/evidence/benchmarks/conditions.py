@@ -1,4 +1,4 @@
-"""Conditions of benchmarks (machine, omission of a pinned first step) and formatting of error levels."""
+"""Conditions of benchmarks (the machine, and a first step that is not pinned), and formatting of error levels."""
 
 import os
 import platform
@@ -8,7 +8,10 @@ from walkerlab.config.reads import ContactConfig
 
 
 def pinning_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
-    """Return an omission entry if the config pins the first stance foot. Measured walks start with both feet free."""
+    """Return an omission if the config pins the first stance foot, because measured walks start with both feet free.
+
+    measured  what is measured, in the plural
+    """
     if config.contact is None or config.contact.stance != "pinned":
         return []
     return [{"what": "pinned first step", "why": f"{measured} are measured on a walk whose first stance foot is free"}]

@@ -30,8 +30,8 @@ class Series:
     """Runs of one method, or of one integrator or contact model of an engine, from coarse to fine."""
 
     look: Look
-    runs: Mapping[str, Array]  # stored columns by name; gaps are NaN
-    filled: bool  # whether the markers are filled
+    runs: Mapping[str, Array]  # stored columns by name, NaN for missing values
+    filled: bool  # whether markers are filled
     engine: str = ""  # empty for methods
 
     @property
@@ -67,11 +67,11 @@ LOOKS = {
 DEFAULT_LOOK = Look("", BLACK, DOTTED, 1.0, "*")
 METHOD_VARIABLES = ("method", "tolerance", "reached", "error", "wall_s", "rhs_evaluations", "outcome")
 MIN_FLOOR = 1e-17  # smallest uncertainty drawn
-FAILURE_LEVEL = 30.0  # height of failed runs in the figure, as a multiple of the largest error
+FAILURE_LEVEL = 30.0  # failed runs are drawn at this multiple of the largest error
 
 
 def method_series(scene: str, results: Results) -> Iterator[Series]:
-    """Yield the series of each method in the order measured. Fully compiled methods have filled markers."""
+    """Yield the series of each method in the order of measurement. Fully compiled methods have filled markers."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
@@ -81,11 +81,11 @@ def method_series(scene: str, results: Results) -> Iterator[Series]:
 
 
 def draw_methods(scene: str, results: Results) -> Drawn:
-    """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs."""
+    """Plot errors over run time (left) and over right-hand sides (right), with crosses for failed runs."""
     all_series = list(method_series(scene, results))
     summary = results["accuracy"].summary
     reference = summary["reference"][scene]
-    # Errors below the difference between the reference and a second one mean nothing.
+    # The difference between the two references is their uncertainty, so errors below it mean nothing.
     floor = max(float(reference["agreement"]), MIN_FLOOR)
     errors = [
         float(np.max(series.runs["error"], where=series.runs["reached"] != 0, initial=floor)) for series in all_series
@@ -136,7 +136,7 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 
 
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """Yield an experiment's series of runs from the gait. Each engine's first series has filled markers."""
+    """Yield the series of an experiment, with runs that start on the gait. The first one of each engine is filled."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines = rows["engine"].astype(str)
     names = rows["integrator"].astype(str)
@@ -153,8 +153,8 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Plot errors over run time: under our law (left) and on each engine's own contact (right)."""
-    # each axes has its own legend, since line styles and markers are reused
+    """Plot errors over run time: under our law (left) and on the native contact of each engine (right)."""
+    # Both axes use the same line styles and markers, so each needs a separate legend.
     figure, panes = panels(4.6, 1, 2)
     experiments = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
@@ -180,7 +180,7 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Plot the last period over step size on engines' own contact, with lines for ADAMS's law and the rigid gait."""
+    """Plot the last period over step size on native contact, with lines for ADAMS's law and the rigid gait."""
     figure, axes = panels(4.2)
     all_series = list(engine_series(scene, OWN_LAW, results))
     summary = results[ENGINES_STAGE].summary

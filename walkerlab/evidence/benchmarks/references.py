@@ -1,6 +1,6 @@
-"""Reference end states of walks, each by two different methods, whose difference is the uncertainty.
+"""Reference end states of walks. Two methods compute each of them, and their difference is the uncertainty.
 
-heyoka's Taylor method computes one of them for a rigid compass.
+For a rigid compass, one of the two is the Taylor method of heyoka.
 """
 
 import importlib.util
@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import Numbers
 
 TAYLOR_METHOD = "heyoka-taylor"
-STOPPED_BY_EVENT = -1  # heyoka's outcome for a stop at the first terminal event; a failure and the time limit differ
+STOPPED_BY_EVENT = -1  # outcome of heyoka after a stop at the first terminal event, but not for failures or time limits
 
 
 def has_heyoka() -> bool:
@@ -25,16 +25,16 @@ def has_heyoka() -> bool:
 
 
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
-    """Return the state after `steps` heel strikes, or None if one of them does not occur."""
+    """Simulate a walk with heyoka. Return the state after `steps` heel strikes, or None if one does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
     passing, striking = taylor_integrators(walker)
     state = np.array(start)
     for _ in range(steps):
-        # Both feet are also on the slope at the start, so the search for the heel strike begins when the legs have
-        # passed.
+        # At the start both feet are on the slope, which must not count as a heel strike. So the search begins after the
+        # legs have passed.
         for integrator in (passing, striking) if state[0] < state[1] else (striking,):
             integrator.time, integrator.state[:] = 0.0, state
-            # For a while after an event heyoka does not look for it again, even if time and state have been replaced.
+            # heyoka ignores an event for a while after it has occurred, even if we replace time and state.
             integrator.reset_cooldowns()
             outcome = integrator.propagate_until(limit)[0]
             if outcome.value != STOPPED_BY_EVENT:
@@ -45,7 +45,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
 
 
 def taylor_integrators(walker: RigidWalker) -> tuple[Any, Any]:
-    """Build two Taylor integrators of the swing phase: one stops when the legs pass, the other at heel strike."""
+    """Build two Taylor integrators of the swing: the first stops when the legs pass, the second at heel strike."""
     import heyoka as hy
 
     th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")
@@ -73,7 +73,7 @@ def taylor_integrators(walker: RigidWalker) -> tuple[Any, Any]:
 
 
 REFERENCE_RUN_BUDGET = 20_000_000  # right-hand sides, enough for the million explicit steps that stiff ground takes
-# On stiff ground the error of an explicit step is only rounding, so a tighter tolerance would only shrink the step.
+# On stiff ground the error of an explicit step is only rounding. A tighter tolerance would shrink steps, not errors.
 TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
@@ -86,7 +86,7 @@ class End:
 
     method: str
     state: Floats
-    tolerance: float = 0.0  # relative tolerance; 0 for Taylor series at machine precision
+    tolerance: float = 0.0  # relative tolerance, or 0 for Taylor series at machine precision
     rhs_evaluations: int = 0  # 0 if they are not counted
 
     def pack(self) -> Numbers:
@@ -108,7 +108,7 @@ class Reference:
 
     @property
     def from_outside(self) -> bool:
-        """Whether the first end state is independent of this project's solvers, event search and equations."""
+        """Whether the first end state shares no solver, event search or equations with this project."""
         return self.first.method == TAYLOR_METHOD
 
     @property
@@ -117,7 +117,7 @@ class Reference:
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def reference_for(self, method: str) -> End:
-        """Return the end state to compare a method with, always one computed by another method."""
+        """Return the end state with which to compare a method: always that of another method."""
         return self.second if method == self.first.method else self.first
 
 
@@ -131,9 +131,9 @@ def reference_for(trial: Trial) -> Reference:
 
 
 def first_end(trial: Trial) -> End:
-    """Compute the end state: by Taylor series for a rigid compass if heyoka is installed, otherwise by dop853.
+    """Compute the end state by Taylor series for a rigid compass if heyoka is installed, otherwise by dop853.
 
-    dop853 shares nothing with the implicit methods, but takes a million steps on stiff ground.
+    dop853 has nothing in common with the implicit methods, but takes a million steps on stiff ground.
 
     Raises WalkEndsError if the walk does not reach its end.
     """

@@ -1,7 +1,7 @@
-"""Walks on which methods are measured, each with a fixed start, a fixed step count and an end state to compare.
+"""Walks on which methods are measured. Each has a fixed start, a fixed step count and an end state to compare.
 
-A rigid walk is also programmed as a user would with NumPy and SciPy: matrices, a linear solve, an event. Contact walks
-have the config's contact or contact near the rigid limit.
+One method is a script for the rigid walk, written as a user of NumPy and SciPy would: matrices, a linear solve, an
+event. Contact walks have the contact of the config, or contact near the rigid limit.
 """
 
 from collections.abc import Callable
@@ -44,7 +44,8 @@ def walk_as_a_script(
 ) -> tuple[Floats | None, int]:
     """Simulate a walk with SciPy's solve_ivp, a NumPy right-hand side and terminal events.
 
-    ends  further event functions that end the walk
+    budget  limit on right-hand sides
+    ends    further event functions that end the walk
 
     Returns the state after the last impact (None if not reached) and the number of right-hand sides.
     """
@@ -71,7 +72,7 @@ def walk_as_a_script(
         return np.concatenate([x[2:], np.linalg.solve(D, -C @ x[2:] - G)])
 
     def heel_strike(_t: float, x: Floats) -> float:
-        # Both feet are also on the slope at the start and when the legs scuff, but then the swing leg is not ahead.
+        # At the start and when the legs scuff, both feet are on the slope as well, but the swing leg is not ahead.
         return float(x[0] + x[1] + 2.0 * slope) if x[0] > x[1] else 1.0
 
     event: Any = heel_strike
@@ -99,7 +100,7 @@ ATOL_PER_RTOL = 1e-2
 @dataclass(frozen=True)
 class TrialRun:
     outcome: str
-    state: Floats  # end state; empty if it was not reached
+    state: Floats  # end state, empty if it was not reached
     rhs_evaluations: int
     accepted: int
     rejected: int
@@ -112,16 +113,16 @@ class RigidTrial:
     walker: RigidModel
     start: tuple[float, ...]
     steps: int
-    compass: RigidWalker | None = None  # the walker in Appendix A's form, for the user's script and heyoka
+    compass: RigidWalker | None = None  # the walker in the form of Appendix A, which the user's script and heyoka need
     name: str = "rigid"
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """All methods of the registry, and the user's script if it covers the walker."""
+        """Names of all methods of the registry, and of the user's script if it covers the walker."""
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """Return a function that walks with a method, ready to be timed. Its calls reuse the same memory."""
+        """Return a function that simulates the walk with a method. It reuses memory, so that its calls can be timed."""
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             assert self.compass is not None, "the script is not among this walker's methods"
@@ -144,7 +145,7 @@ class RigidTrial:
 
         def run() -> TrialRun:
             clear_counts(solver)
-            # Calls reuse the solver, and the step size at the end of one walk must not help the next.
+            # Calls reuse the solver. The step size at the end of one walk must not help the next one.
             solver.clock[H_NEXT] = 0.0
             status, _ = stride(walker, solver, finder, observer, np.array(self.start), strikes)
             return make_run(Outcome(status), strikes.after[-1], solver.counts)
@@ -182,12 +183,12 @@ Trial = RigidTrial | ContactTrial
 
 
 def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
-    """Build a run's record. It has an end state only if the outcome is `WALKED`."""
+    """Build the record of a run. It has an end state only if the outcome is `WALKED`."""
     end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))
 
 
-# near-rigid contact: factors on stiffness and damping, and on creep velocities
+# factors on stiffness and damping, and on creep velocities, that bring contact near the rigid limit
 STIFFNESS_FACTOR = 100.0
 CREEP_FACTOR = 0.01
 
@@ -195,7 +196,11 @@ CREEP_FACTOR = 0.01
 def contact_trial(
     config: ContactConfig, state: State, length_m: float, steps: int, asymmetry: float = 0.0
 ) -> ContactTrial:
-    """Set up the walk with the config's contact, on pads of length `length_m`. `asymmetry` as in `contact_scene`."""
+    """Set up the walk with the contact of the config.
+
+    length_m   step length (m) of the rigid gait, also used for that of the contact gait
+    asymmetry  as in `contact_scene`
+    """
     scene = contact_scene(config, length_m, length_m, asymmetry)
     return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 

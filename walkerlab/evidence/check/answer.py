@@ -1,4 +1,4 @@
-"""Check of a printed gait: a comparison of every printed value with the right one, and explanations of differences."""
+"""Check of a printed gait: compare every printed value with the right one, and explain the differences."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
 
-SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
-SAME_GAIT: Final = 1e-6
-SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
+SAME_ROUTE: Final = 1e-10  # the two routes agree if they differ by less than this, with L and g of 1
+SAME_GAIT: Final = 1e-6  # starts that differ by less than this belong to the same gait
+SMALL_VALUE: Final = 1e-3  # differences are relative for printed values above this, and absolute below
 GAIT_VALUES: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",
@@ -37,11 +37,11 @@ WALK_VALUES: Final = {
     "mean_energy_J": "energy_J", "last_step_period_s": "period_s", "last_step_length_m": "step_length_m",
     "step_periods_s": "period_s", "step_lengths_m": "step_length_m",
 }  # fmt: skip
-"""Names of `simulate` under which a value may be printed, each with the quantity of `fixedpoint` that it equals."""
+"""Values of `simulate` that may be printed, each with the value of `fixedpoint` that it equals on a gait."""
 
 
 def refuse_unknown(check: Check) -> None:
-    """Raise ConfigError if a config's block `check` names values that no gait has, or a state is no list."""
+    """Raise ConfigError if the block `check` names a value that no gait has, or if a printed state is not a list."""
     known = (*GAIT_VALUES, *WALK_VALUES)
     for name in check.printed:
         if name not in known:
@@ -76,7 +76,7 @@ class Checked:
 
     @cached_property
     def items(self) -> list[Item]:
-        """Printed values of a gait, states first."""
+        """All printed numbers, those of states first."""
         listed = states_of(self.check)
         return items_of({**listed, **self.check.printed}, {name: self.stated(name).names for name in listed})
 
@@ -97,15 +97,15 @@ class Checked:
 
     @property
     def convention(self) -> Convention:
-        """Convention of the printed state or, if none is printed, this package's own."""
+        """Convention of the printed state or, if none is printed, the one that the block `check` states."""
         for convention in self.conventions.values():
             return convention
         return stated(self.check, 2 * len(self.check.angles.order or (0, 0)), 3)
 
     def printed_state(self, name: str, known: Floats) -> tuple[Floats, Floats] | None:
-        """Return a printed state of all bodies, and its change if all numbers change by a unit of their last digit.
+        """Return a printed state of all bodies, and its change if each number changes by a unit of its last digit.
 
-        Values that are not printed are those of the state `known`.
+        Values that are not printed are taken from the state `known`. Return None if the state is not printed.
         """
         if name not in self.conventions:
             return None
@@ -119,7 +119,7 @@ class Checked:
 
     @cached_property
     def gaits(self) -> dict[CheckedStep, dict[str, Any]]:
-        """The right gaits, with their values by the compiled model. The one that `fixedpoint` reports comes first."""
+        """The right gaits with their values from the compiled model. The gait that `fixedpoint` reports comes first."""
         names = state_names(self.config)
         found = {}
         # False sorts before True, so the reported gait comes first.
@@ -150,7 +150,7 @@ class Checked:
         return gait.values(self.items, self.convention, self.gaits.get(gait, {}))
 
     def distance(self, gait: CheckedStep) -> float:
-        """Return the distance of a gait from the printed values, each relative to its size."""
+        """Return the sum of the relative differences of a gait from all printed values, each at most 1."""
         values = self.values(gait)
         pairs = [(item.printed.value, values[item.name]) for item in self.items]
         return sum(
@@ -160,7 +160,7 @@ class Checked:
 
     @cached_property
     def question(self) -> Question:
-        """Printed values to explain."""
+        """The printed values that an explanation must reproduce: those that the plain model computes."""
         values = self.right.values(self.items, self.convention)
         items = [item for item in self.items if values[item.name] is not None]
         printed = self.printed_state("state", plain.full_state(self.walker, self.right.start))
@@ -199,7 +199,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, Any]:
 def check_gait(config: CheckConfig) -> dict[str, Any]:
     """Check the printed gait of a config, and return the answer as JSON values.
 
-    Raises ConfigError if the config has no block `check`, or one that does not fit its walker.
+    Raises ConfigError if the config has no block `check`, or if the block does not fit the walker.
     """
     check = config.check
     if check is None:
@@ -238,7 +238,7 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
 
 
 def answer_without(check: Check, reason: str) -> dict[str, Any]:
-    """Return the answer if there is no right gait to compare with."""
+    """Return the answer for a gait that cannot be compared, for the given reason."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
     rows = [judge(item, None, reason).row for item in items]
     head = {
@@ -263,7 +263,7 @@ def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explana
 
 
 def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
-    """Measure how far the printed state is from periodic, or return None if none is printed or it does not walk."""
+    """Measure how far the printed state is from periodic, or return None if no state is printed."""
     walker = checked.walker
     printed = checked.printed_step
     if printed is None or right.derivative is None:
@@ -273,7 +273,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
         return {"residual": None, "digits": 0, "is_periodic": False}
     unit = plain.scales(walker, len(start))
     residual = np.abs(step.after - start)
-    # change over the step that the rounding of the printed state explains
+    # A periodic state may change by this much over a step, because it is printed with rounding.
     allowed = np.abs(right.derivative - np.eye(len(start))) @ rounding + EXACT_ERROR * unit
     largest = float((residual / unit).max())
     answer = {
@@ -293,7 +293,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
 
 
 def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
-    """Return the balances of angular momentum over the heel strike that precedes the printed state."""
+    """Return how well angular momentum is conserved over the heel strike just before the printed state."""
     walker = checked.walker
     own = checked.printed_step
     if own is None or own.start is None or checked.convention.instant != "after-strike":
@@ -310,7 +310,7 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
     else:
         return []
     M, momentum = plain.strike_balances(walker, before)
-    # the momenta before change with rounded angles and rates about as much as those after
+    # Rounding changes the momenta before the strike about as much as those after it, hence the factor of 2.
     size = np.abs(start[2:]).max()
     allowed = 2.0 * np.abs(M).sum(axis=1) * (rounding[2:].max() + size * rounding[:2].max() + EXACT_ERROR)
     return [
@@ -329,7 +329,10 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
 
 
 def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
-    """Return the change of energy (J) from the printed state just after a strike to the one before the next."""
+    """Return the change of energy (J) from the printed state just after a strike to that just before the next one.
+
+    Return nothing if one of them is not printed.
+    """
     walker = checked.walker
     if walker.kneed or checked.convention.instant != "after-strike":
         return {}
@@ -358,7 +361,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
-    """Compare both routes: the compiled model's gait must return to itself in the plain model."""
+    """Compare both routes: in the plain model, the gait of the compiled model must return to itself after a step."""
     unit = plain.scales(gait.walker, len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())

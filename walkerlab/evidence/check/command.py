@@ -59,11 +59,11 @@ OFFER = Offer(check, ("config", "sets", "as_json", "quiet", "verbose"))
 
 
 def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the given configs, and the configs in given folders.
+    """Yield the configs among the paths, and those in the folders among them.
 
-    Raises ConfigError for a folder without any.
+    Raises ConfigError for a folder without configs.
     """
-    # imported here, as below: help must load neither the config nor NumPy
+    # Imported here and below, because the help would otherwise have to load the config and NumPy.
     from walkerlab.config.files import BUILTIN_FOLDER, PUBLISHED, SUFFIXES
 
     for typed in paths:

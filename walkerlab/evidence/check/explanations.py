@@ -2,7 +2,7 @@
 
 Each candidate is a walker: the plain model with a mistake that is known from publications and programs, or with a
 misprinted parameter. A step from the printed state gives a first guess of its gait. Gaits are solved only for the best
-candidates, and only a gait with every printed digit is an explanation.
+candidates, and only a gait that reproduces the printed digits is an explanation.
 """
 
 from __future__ import annotations
@@ -27,17 +27,19 @@ from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, Mistake,
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
-REFINED: Final = 5  # candidates that are solved
-FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
-SAME_WALK = 1e-7  # a smaller relative change of a first guess counts as none
-FITTING_ROUNDS, LEAST_GAIN = 4, 3.0  # of a mistake's size, which must bring gaits this many times closer
+MAX_SOLVED: Final = 5  # number of candidates whose gaits are solved
+FARTHEST_GUESS = 0.3  # rad, distance from the printed state above which a first guess has no meaning
+SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
+# rounds in which the size of a mistake is fitted, and how many times closer the fit must bring gaits
+FITTING_ROUNDS, MIN_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
-SIZE_SHARE = 0.03  # relative error of a fitted size within which a round one is tried
-FEW = 3  # at least this many numbers must be explained if others are not
+SIZE_SHARE = 0.03  # a round size is tried if it is this close to the fitted one (relative)
+MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all of them
 MUCH_CLOSER = 5.0  # a cause must bring gaits this many times closer to be reported
-READINGS = 3  # number of other conventions in which mistakes are looked for
-NEARLY = 4.0  # conventions up to this many times further off than the nearest are ranked by changes
-CONVERGED: Final = 1e-6  # relative change of a fitted value
+READINGS = 3  # number of other conventions in which we search for mistakes
+# conventions that miss by up to this many times as much as the nearest one are ranked by their number of changes
+NEAR_FACTOR = 4.0
+CONVERGED: Final = 1e-6  # a fit ends when its value changes by less than this (relative)
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
 FIELDS: Final[Mapping[str, Any]] = {SLOPE: "slope", GRAVITY: "gravity"}
@@ -49,7 +51,7 @@ class Candidate(NamedTuple):
     """A walker that may explain the printed values."""
 
     kind: str  # mistake or misprint
-    what: str  # ends a sentence that begins with 'All printed values follow if'
+    what: str  # completes the sentence 'All printed values follow if ...'
     walker: PlainWalker
     family: str = ""  # the mistake without its size, if it has one
 
@@ -58,7 +60,7 @@ def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
     """Yield walkers with one parameter changed as a misprint could change it."""
     values = parameters(config)
     for key, value in values.items():
-        for other, how in misprinted(key, value, values):
+        for other, how in list_misprints(key, value, values):
             walker = walker_with(config, key, other)
             if walker is not None:
                 yield Candidate("misprint", f"{key} is {short_number(other)} ({how})", walker)
@@ -79,11 +81,14 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
     return walker if turns and walker.leg_length > walker.radius >= 0.0 < walker.gravity else None
 
 
-def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
-    """Return the values that may have been misprinted as this one, and how."""
+def list_misprints(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Return the values that may have been misprinted as `value`, each with a description of the misprint.
+
+    values  parameters of the config, one of which may have been printed for another
+    """
     unit = UNIT.findall(key)
     found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
-    found |= dict.fromkeys(transposed(value), "two digits are transposed")
+    found |= dict.fromkeys(transpose_digits(value), "two digits are transposed")
     found |= {float(f"{value * factor:.12g}"): "a factor of ten" for factor in (0.1, 10.0)}
     if key == SLOPE:
         found[math.radians(value)] = "degrees as radians"
@@ -92,8 +97,8 @@ def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tupl
     return [(other, how) for other, how in found.items() if other != value]
 
 
-def transposed(value: float) -> Iterator[float]:
-    """Yield the values of a number with two neighbouring digits exchanged."""
+def transpose_digits(value: float) -> Iterator[float]:
+    """Yield the numbers that differ from `value` by an exchange of two neighbouring digits."""
     text = short_number(value)
     for place, (first, second) in enumerate(pairwise(text)):
         if first.isdigit() and second.isdigit() and first != second:
@@ -102,16 +107,16 @@ def transposed(value: float) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Cause that reproduces printed values."""
+    """A cause that would produce the printed values."""
 
     kind: str  # convention, mistake or misprint
-    what: str
-    reproduces: tuple[str, ...]  # names of printed numbers
-    digits: int  # smallest number of digits that agree
+    what: str  # completes the sentence 'All printed values follow if ...'
+    reproduces: tuple[str, ...]  # names of the printed numbers that follow from it
+    digits: int  # smallest number of digits of these numbers
 
 
 Attempt = tuple[Candidate, CheckedStep]
-"""A walker that may explain the printed values, and its gait."""
+"""A candidate and the gait of its walker."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ class Question:
     items: Sequence[Item]
     convention: Convention
     right: CheckedStep
-    state: Floats | None  # of all bodies, as printed; None if no state is printed
+    state: Floats | None  # printed state of all bodies, or None if no state is printed
     gaits: Sequence[CheckedStep] = ()  # all right gaits
 
     @property
@@ -141,7 +146,7 @@ class Question:
 
     @cached_property
     def quick_items(self) -> list[Item]:
-        """Printed numbers of states or, if none is printed, all that need no derivative."""
+        """Printed numbers of states or, if no state is printed, all numbers that need no derivative."""
         return self.state_items or self.exact_items
 
     def explanation(self, kind: str, what: str, items: Sequence[Item] = ()) -> Explanation:
@@ -154,28 +159,31 @@ class Question:
         return [item for item in items if item.fits(values[item.name])]
 
     def fits(self, walk: CheckedStep, convention: Convention) -> bool:
-        """Whether a gait reproduces every printed digit. Numbers that need no derivative are compared first."""
+        """Whether a gait reproduces every printed digit. The numbers that are fastest to compute are compared first."""
         return all(self.reproduced(walk, items, convention) == items for items in (self.quick_items, self.items))
 
     def explained_by(self, candidate: Candidate, gait: CheckedStep) -> Explanation | None:
         """Return what a candidate's gait explains, or None if it explains too little.
 
-        Of the printed numbers, at least three must be wrong, and the gait must reproduce every digit of all of them, or
-        at least of the states.
+        The gait must reproduce every digit of the printed states, and of at least three printed numbers (of all, if
+        fewer are printed).
         """
         if self.reproduced(gait, self.state_items) != self.state_items:
             return None
         reproduced = self.reproduced(gait, self.items)
-        enough = len(reproduced) >= min(FEW, len(self.items))
+        enough = len(reproduced) >= min(MIN_REPRODUCED, len(self.items))
         return self.explanation(candidate.kind, candidate.what, reproduced) if enough else None
 
     def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
-        """Return the largest distance of a walk from a printed value, in units of its last digit."""
+        """Return the largest difference between a walk and a printed value, in units of the value's last digit."""
         values = walk.values(items, convention or self.convention)
         return max((item.miss(values[item.name]) for item in items), default=math.inf)
 
     def misses(self, walker: PlainWalker | None) -> Floats | None:
-        """Return the signed distances of a walker's gait, estimated from a first guess, in units of the last digits."""
+        """Return how far a walker's first guess is from each printed value: signed, in units of its last digit.
+
+        Return None if there is no first guess, or if there are fewer than two values to compare.
+        """
         walk = None if walker is None else self.guess(walker, EXACT)
         if walk is None:
             return None
@@ -185,7 +193,10 @@ class Question:
         return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
-        """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
+        """Return a first guess of a walker's gait, by a Newton step from the printed state or, if none, the right gait.
+
+        Return None if that leads nowhere.
+        """
         start = (
             self.right.start if self.state is None else plain.start_from(walker, self.state, self.convention.instant)
         )
@@ -195,7 +206,7 @@ class Question:
         move = np.linalg.solve(np.eye(len(start)) - self.right.derivative, step.after - start)
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
-        # a value may be printed that the state alone does not determine
+        # Printed values such as the period need the step from the new start. A state just after a strike does not.
         quantities = {self.convention.instant, *(item.quantity for item in self.quick_items)}
         after = step if quantities == {"after-strike", "state"} else plain.take_step(walker, start + move, tolerance)
         return None if after is None else CheckedStep(walker, start + move, after)
@@ -208,32 +219,32 @@ class Question:
 
 
 def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | None]:
-    """Return the explanations that fit, and the cause that comes closest if none does.
+    """Return the explanations that fit or, if none does, the cause that comes closest.
 
-    Conventions come first, then misprinted values, then mistakes and misprinted parameters together, and at last these
-    in other conventions.
+    Other conventions and misprinted values are tried first, then mistakes and misprinted parameters, and finally these
+    together with other conventions.
     """
     # Almost any cause can explain a single number.
     if sum(item.printed.bounds is None for item in question.items) < 2:
         return [], None
-    if found := [*conventions(question), *misprinted_values(question)]:
+    if found := [*find_conventions(question), *find_misprinted_value(question)]:
         return found, None
-    attempts = [*attempts_at(question)]
-    found = [*at_the_start(question), *explained(question, attempts)]
+    attempts = [*attempt_all(question)]
+    found = [*find_strike_at_start(question), *explain_by_gaits(question, attempts)]
     if not found:
-        for changes, reading in closer_readings(question):
-            for each in explained(reading, attempts_at(reading)):
+        for changes, reading in find_closer_readings(question):
+            for each in explain_by_gaits(reading, attempt_all(reading)):
                 if len(each.reproduces) == len(question.items):
                     found.append(replace(each, what=f"{changes}, and {each.what}"))
             if found:
                 break
     most = max((len(each.reproduces) for each in found), default=0)
     complete = [each for each in found if len(each.reproduces) == most]
-    return complete, None if complete else closest(question, attempts)
+    return complete, None if complete else find_closest(question, attempts)
 
 
-def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
-    """Yield the explanations that the gaits of attempts give. A mistake that has a size counts once."""
+def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
+    """Yield an explanation for each attempt whose gait supports one. A mistake tried at several sizes counts once."""
     families: set[str] = set()
     for candidate, gait in attempts:
         explanation = None if candidate.family in families else question.explained_by(candidate, gait)
@@ -242,11 +253,11 @@ def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt
             families |= {candidate.family} - {""}
 
 
-def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions that fit the printed values better than the stated one, with the question in them.
+def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
+    """Yield conventions that fit the printed values better than the stated one, and the question in each of them.
 
-    If a convention puts both feet on the slope, it suffices that the right gait comes closer to the printed values than
-    in the stated one, which does not. All others must bring it much closer.
+    A convention must bring the right gait much closer to the printed values. If it puts both feet on the slope and the
+    stated one does not, closer is enough.
     """
     if question.state is None:
         return
@@ -255,7 +266,7 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     far = question.miss(question.right, question.exact_items)
     readings: dict[Any, tuple[float, Convention]] = {}
     for other in alternatives(question.convention):
-        # of conventions in which the right gait has the same values, the first has the fewest changes
+        # If the right gait has the same values in several conventions, keep the first, which has the fewest changes.
         values = question.right.values(question.exact_items, other)
         miss = max(item.miss(values[item.name]) for item in question.exact_items)
         if miss < far:
@@ -263,15 +274,15 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     standing = [(miss, other) for miss, other in readings.values() if other.stands(walker, items)]
     gain = 1.0 if standing and not question.convention.stands(walker, items) else MUCH_CLOSER
     closer = [(miss, other) for miss, other in standing or readings.values() if miss * gain < far]
-    near = NEARLY * min((miss for miss, _ in closer), default=0.0)
+    near = NEAR_FACTOR * min((miss for miss, _ in closer), default=0.0)
     closer.sort(key=lambda each: (len(each[1].differences(question.convention)), each[0]))
     for other in [other for miss, other in closer if miss <= near][:READINGS]:
         state = other.read(walker, [item.value for item in items], plain.full_state(walker, question.right.start))
         yield join_words(other.differences(question.convention)), replace(question, convention=other, state=state)
 
 
-def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
-    """Return the cause that brings a gait much closer to the printed values, or None if no cause does."""
+def find_closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
+    """Return the cause that comes closest to the printed values, or None if it is not much closer than the gait."""
     if not question.quick_items:
         return None
     without = question.miss(question.right, question.quick_items)
@@ -282,8 +293,8 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
     return {"kind": candidate.kind, "what": candidate.what, "miss_in_units": miss, "without_in_units": without}
 
 
-def attempts_at(question: Question) -> Iterator[Attempt]:
-    """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
+def attempt_all(question: Question) -> Iterator[Attempt]:
+    """Yield the most promising candidates with their gaits, then mistakes of fitted size with theirs."""
     right = question.guess(question.walker)
     guesses = []
     mistakes = [*plain.list_mistakes(question.walker)]
@@ -291,12 +302,12 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     candidates += generate_misprints(question.config)
     for place, candidate in enumerate(candidates):
         guess = question.guess(candidate.walker)
-        if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
+        if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_GUESS, SAME_GUESS)):
             guesses.append((question.miss(guess, question.quick_items), place, guess))
     # The index decides between equal distances, because guesses cannot be compared.
-    for _, place, guess in heapq.nsmallest(REFINED, guesses):
+    for _, place, guess in heapq.nsmallest(MAX_SOLVED, guesses):
         yield from question.attempt(candidates[place], guess)
-    if len(question.items) < FEW:
+    if len(question.items) < MIN_REPRODUCED:
         return
     for mistake in filter(attrgetter("first"), mistakes):
         for size in sizes_to_try(question, mistake):
@@ -308,16 +319,20 @@ class FittedSize(NamedTuple):
     """Value of a parameter that brings gaits closest to the printed values."""
 
     value: float
-    change: float  # relative change in the last round
-    without: float  # largest distance before the fit, in units of last digits
-    left: float  # the distance that remains if gaits change in proportion to the parameter
+    change: float  # relative change of the value in the last round
+    without: float  # largest distance at the first value, in units of last digits
+    left: float  # predicted largest distance after the fit, if gaits change in proportion to the parameter
 
 
 def fit(
     question: Question, walker_of: Callable[[float], PlainWalker | None], begin: float, near: float,
     limits: tuple[float, float] = (-math.inf, math.inf),
 ) -> FittedSize | None:  # fmt: skip
-    """Fit a parameter to the printed values by secants from a first value, or return None if that leads nowhere."""
+    """Fit a parameter to the printed values by the secant method, or return None if that leads nowhere.
+
+    begin, near  two values of the parameter with which the method starts
+    limits       smallest and largest value allowed
+    """
     without = question.misses(walker_of(begin))
     result = None
     for _ in range(FITTING_ROUNDS):
@@ -325,7 +340,7 @@ def fit(
         if without is None or there is None or near == begin:
             return None
         slope = (there - without) / (near - begin)
-        # A parameter that changes no printed value stays where it is.
+        # A parameter that changes no printed value must not move, hence the division by infinity.
         move = -float(slope @ without) / float(slope @ slope or math.inf)
         value = begin + move
         if not limits[0] <= value <= limits[1]:
@@ -339,12 +354,12 @@ def fit(
 
 
 def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
-    """Yield round sizes near the one that brings a mistake's gait closest to the printed values, then that one.
+    """Fit the size of a mistake to the printed values, and yield round sizes near the result, then the result.
 
-    There are none if it does not come much closer than the right gait.
+    Yield nothing if the mistake does not come much closer than the right gait.
     """
     fitted = fit(question, mistake.of_size, 0.0, mistake.first, mistake.limits)
-    if fitted is None or fitted.left * LEAST_GAIN > fitted.without:
+    if fitted is None or fitted.left * MIN_GAIN > fitted.without:
         return
     size = fitted.value
     power = 10.0 ** math.floor(math.log10(size))
@@ -355,8 +370,11 @@ def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
     yield size
 
 
-def at_the_start(question: Question) -> Iterator[Explanation]:
-    """Yield the explanation that a script detects the event at its start, if a -1 is printed and the gait has none."""
+def find_strike_at_start(question: Question) -> Iterator[Explanation]:
+    """Yield the explanation that a script detects the heel strike at which it starts.
+
+    A multiplier of -1 must be printed, and the gait must reproduce all other values.
+    """
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
     if minus_one and len(question.reproduced(question.right, others)) == len(others):
@@ -364,10 +382,13 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
         yield question.explanation("mistake", what)
 
 
-def conventions(question: Question) -> Iterator[Explanation]:
-    """Yield the other conventions with the fewest changes under which the right gait has every printed digit."""
+def find_conventions(question: Question) -> Iterator[Explanation]:
+    """Yield other conventions under which the right gait has every printed digit.
+
+    Only those with the fewest changes are kept.
+    """
     found: dict[str, int] = {}
-    for what, walk in scenes(question):
+    for what, walk in list_right_gaits(question):
         for other in (question.convention, *alternatives(question.convention)):
             changes = [*([what] if what else []), *other.differences(question.convention)]
             if not changes or len(changes) > min(found.values(), default=math.inf):
@@ -380,8 +401,11 @@ def conventions(question: Question) -> Iterator[Explanation]:
             yield question.explanation("convention", what)
 
 
-def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
-    """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
+def list_right_gaits(question: Question) -> Iterator[tuple[str, CheckedStep]]:
+    """Yield right gaits with the change that each needs: none, or another reading of the stated leg length.
+
+    The leg length may have been meant to include the foot's radius, or to exclude it.
+    """
     yield from (("", gait) for gait in question.gaits)
     walker = question.walker
     printed = None if question.state is None else plain.start_from(walker, question.state, question.convention.instant)
@@ -389,14 +413,17 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius
         other = replace(walker, foot=foot)
-        # The foot must stay below the hip.
+        # The search has no meaning for a foot above the hip.
         gaits = (gait_near(other, start) for start in starts if foot.imag < 0.0)
         for gait in [*filter(None, gaits)][:1]:
             yield f"the stated leg length {how} the foot's radius", gait
 
 
-def misprinted_values(question: Question) -> Iterator[Explanation]:
-    """Yield explanations by a lost sign or exchanged digits in one value, if all others but multipliers are right."""
+def find_misprinted_value(question: Question) -> Iterator[Explanation]:
+    """Yield the explanation that one value has a wrong sign or two exchanged digits.
+
+    All other values must be right. Multipliers do not count.
+    """
     items = [item for item in question.items if item.quantity != "multipliers"]
     values = question.right.values(items, question.convention)
     wrong = [item for item in items if not item.fits(values[item.name])]
@@ -409,12 +436,12 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
-    elif any(item.fits(right + printed - other) for other in transposed(printed)):
+    elif any(item.fits(right + printed - other) for other in transpose_digits(printed)):
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 
 def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
-    """Return parameters with new values, each of which alone makes the printed state periodic."""
+    """Return new values of parameters, by key. Each of them alone would make the printed state periodic."""
     if question.state is None:
         return []
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
@@ -432,5 +459,5 @@ def advise(explanations: Sequence[Explanation]) -> str:
     if len(explanations) < 2:
         return ""
     if {each.kind for each in explanations} == {"convention"}:
-        return "Several conventions fit; the source must say which of them it uses."
-    return "Several explanations fit; more printed digits, or another printed value, would decide between them."
+        return "Several conventions fit. The source must say which of them it uses."
+    return "Several explanations fit. More printed digits, or another printed value, would decide between them."

@@ -1,6 +1,6 @@
 """Gaits of plain walkers, and their values in the conventions in which they are printed.
 
-A convention has the order and origin of the angles, the instant of the state, and the units.
+A convention says how to read a printed state: the order and origin of the angles, its instant, and the units.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ DEFAULT_ORDERS: Final = {2: ("stance",), 4: ("swing", "stance"), 6: ("swing", "s
 GRAVITIES: Final = (1.0, 9.8, 9.81, 10.0)
 SCALED: Final = "sqrt(L/g)"
 RAD_IN_DEG: Final = math.degrees(1.0)
-FEET_DIGITS = 5.0  # largest distance of the feet from the slope, in units of the last digit
+# The feet count as on the slope if they are within this distance, in units of the last digit.
+FEET_DIGITS = 5.0
 CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
     "origin": ("angles are measured from {}", {"vertical": "the vertical", "slope-normal": "the slope’s normal"}),
     "second": ("the second angle is {}", {
@@ -51,25 +52,25 @@ CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
         **{f"{gravity:g}": f"gravity is {gravity:g} m/s²" for gravity in GRAVITIES},
     }),
 }  # fmt: skip
-"""Conventions: for each, a sentence about it, and the words for its values."""
+"""Choices that make up a convention: for each, a clause about it, and the words that its values put in there."""
 BEFORE: Instant = "before-strike"
 Values = dict[str, complex | None]
-"""Values of printed numbers by name, or None if a gait has none."""
+"""Values of printed numbers by name, or None for a number that the gait does not have."""
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Exponent of 1/s in the unit of a quantity."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
-# Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
+# Displacement (rad, and rad/s times sqrt(L/g)) for central differences: near the optimum for errors of `EXACT`.
 DIFFERENCE = 1e-6
-MAX_MOVES = 16
-SMALLEST_MOVE = 1e-13
-MAX_RESIDUAL = 1e-11  # largest residual of a gait, due to rounding
-SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is computed again
+MAX_MOVES = 16  # iterations of Newton's method
+SMALLEST_MOVE = 1e-13  # a gait that moves by less over a step is accepted at once
+MAX_RESIDUAL = 1e-11  # largest residual of a gait if rounding prevents further progress
+SLOW_RATIO = 0.1  # if the error shrinks by less than this factor, the derivative is computed again
 
 
 @dataclass(frozen=True)
 class Convention:
-    """Conventions that determine the meaning of a printed state and of printed times. `CHOICES` has their values."""
+    """How a printed state and printed times are to be read. `CHOICES` describes the fields and their values."""
 
     origin: str
     second: str
@@ -79,10 +80,13 @@ class Convention:
     layout: str
     instant: Instant
     steps: int = 1  # steps that a printed period, length or multiplier belongs to
-    time: str = ""  # unit of time, or the gravity that was used; empty for the config's
+    time: str = ""  # unit of time, or gravity that was used. Empty for seconds and the config's gravity
 
     def rows(self, bodies: int) -> Floats:
-        """Return the matrix (printed angles, bodies) from absolute angles to printed ones of the same origin."""
+        """Return the matrix (printed angles, bodies) that converts the absolute angles of all bodies into printed ones.
+
+        Both are measured from the same origin.
+        """
         K = np.eye(bodies)[[BODIES[body] for body in self.order]]
         second = (1.0, -1.0) if self.second == "relative" else (-1.0, 1.0)
         for row, body in enumerate(self.order):
@@ -91,7 +95,7 @@ class Convention:
         return K * (1.0 if self.positive == "counter-clockwise" else -1.0) * (RAD_IN_DEG if self.unit == "deg" else 1.0)
 
     def arrange(self, pairs: NDArray[Any]) -> list[Any]:
-        """Return angles and rates, or their names (2, bodies), in the order in which they are printed."""
+        """Return a list in printed order of angles and rates (2, bodies), or of their names."""
         return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
 
     @property
@@ -100,7 +104,10 @@ class Convention:
         return self.arrange(np.array([[f"{body}_{kind}" for body in self.order] for kind in ("angle", "rate")]))
 
     def write(self, walker: PlainWalker, state: Floats) -> list[float]:
-        """Return the printed numbers of a state: absolute angles from the slope's normal, then rates, of all bodies."""
+        """Return the numbers that would be printed for a state.
+
+        state  absolute angles of all bodies from the slope's normal, then their rates
+        """
         angles, rates = np.reshape(state, (2, -1))
         K = self.rows(len(angles))
         tilt = walker.slope if self.origin == "vertical" else 0.0
@@ -126,19 +133,19 @@ class Convention:
         return state
 
     def stands(self, walker: PlainWalker, items: Sequence[Item]) -> bool:
-        """Whether a printed state has both feet on the slope, within its digits. False in mid-stance."""
+        """Whether both feet of a printed state are on the slope, within its digits. It is False in mid-stance."""
         state = self.read(walker, [item.value for item in items], np.zeros(6 if walker.kneed else 4))
         near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if self.unit == "deg" else 1.0)
         return self.instant != "mid-stance" and abs(walker.feet_apart(state)) <= near
 
     def rate_factor(self, walker: PlainWalker) -> float:
-        """Return the factor on rates, and on the inverse of times, due to the unit of time."""
+        """Return the factor by which the unit of time multiplies rates and divides times."""
         if self.time == SCALED:
             return walker.pendulum_time
         return math.sqrt(float(self.time) / walker.gravity) if self.time else 1.0
 
     def differences(self, other: Convention) -> list[str]:
-        """Describe each difference of this convention from another."""
+        """Describe each choice of this convention that differs from `other`."""
         values = {name: getattr(self, name) for name in CHOICES}
         changes = {name: value for name, value in values.items() if value != getattr(other, name)}
         return [CHOICES[name][0].format(CHOICES[name][1][value]) for name, value in changes.items()]
@@ -147,7 +154,10 @@ class Convention:
 def stated(check: Check, count: int, bodies: int, name: str = "state") -> Convention:
     """Return the convention that a config states for a printed state of `count` numbers.
 
-    Raises ConfigError if they do not fit.
+    bodies  number of bodies of the walker
+    name    key of the state
+
+    Raises ConfigError if the numbers do not fit the order of the bodies.
     """
     angles = check.angles
     instant = "before-strike" if name == "state_before" else check.instant
@@ -164,7 +174,10 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
 
 
 def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
-    """Return a printed state's convention, with the sign of its relative angle such that both feet are on the slope."""
+    """Return the convention with the sign of a relative angle that puts both feet of the printed state on the slope.
+
+    Return it unchanged if the angle is not relative, or if neither sign does.
+    """
     if convention.second != "relative" or len(convention.order) < 2 or convention.stands(walker, items):
         return convention
     opposite = replace(convention, second="stance-minus-swing")
@@ -184,7 +197,7 @@ def alternatives(convention: Convention) -> list[Convention]:
 
 
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
-    """Return the derivative of the step map at a start by central differences, or None where a step fails."""
+    """Return the derivative of the step map at a start by central differences, or None if a step fails."""
     columns = []
     moves = DIFFERENCE * plain.scales(walker, len(start))
     for k, move in enumerate(moves):
@@ -201,7 +214,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
-    """One step of a walker: a gait, or a first guess at one."""
+    """A step of a walker, which is a gait or a first guess of one."""
 
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike
@@ -213,7 +226,7 @@ class CheckedStep:
 
     @cached_property
     def multipliers(self) -> tuple[complex, ...]:
-        """Multipliers of the step map on its section, largest first. The one that is always zero is left out."""
+        """Multipliers of the step map, largest first, without the one that is always zero."""
         if self.derivative is None:
             return ()
         # Just after a strike both feet are on the slope, so one combination of the coordinates never changes. Its
@@ -222,7 +235,7 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value by name, or None if the plain model lacks it."""
+        """Return a value of the gait by name, or None if the plain model does not compute it."""
         if name == "multipliers":
             return self.multipliers
         if name == "spectral_radius":
@@ -239,7 +252,7 @@ class CheckedStep:
     def values(
         self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] | None = None
     ) -> Values:
-        """Return the right value of each printed number in the printed conventions, or None if the models lack it.
+        """Return the right value of each printed number in the given convention, or None if no model computes it.
 
         measured  values of the compiled model by name, which replace those of the plain one
         """
@@ -268,7 +281,7 @@ class CheckedStep:
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         """Return the state of all bodies at an instant of the step, or None if the step has no such instant.
 
-        vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
+        vertical  whether the stance leg is vertical in mid-stance. If not, it is normal to the slope
         """
         if instant != "mid-stance":
             return plain.full_state(self.walker, self.start if instant == "after-strike" else self.step.before)
@@ -289,7 +302,7 @@ class CheckedStep:
 def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> CheckedStep | None:
     """Find the gait near a start by Newton's method, or return None if it is not found.
 
-    A  derivative of the step map of a similar walker, with which the search begins
+    A  derivative of the step map of a similar walker, used until the search slows down
     """
     unit = plain.scales(walker, len(start))
     best: CheckedStep | None = None

@@ -1,9 +1,9 @@
-"""A plain model of a walker, the second route to its gaits, in which known mistakes can be switched on.
+"""A plain model of a walker: a second route to its gaits, in which known mistakes can be switched on.
 
-It shares no equations with the compiled model. Lagrange's equations follow from the point masses of the walker's parts,
-whose velocities are linear in the rates of its bodies; heel and knee strikes are balances of angular momentum. All
-positions are complex numbers in the slope's frame, real along the slope and imaginary along its normal, and angles are
-measured from the normal, counter-clockwise.
+It shares no equations with the compiled model. It derives Lagrange's equations from point masses, whose velocities are
+linear in the rates of the bodies. Heel and knee strikes are balances of angular momentum. Positions are complex numbers
+in the frame of the slope: real along the slope, imaginary along its normal. Angles are measured from the normal,
+counter-clockwise.
 
 State of a walker: angles, then rates, of the swing leg (its thigh), the stance leg and, while its knee is free, the
 swing shank. A torso on the legs' bisector follows them.
@@ -38,12 +38,13 @@ STANCE = 1
 SHANK = 2
 TORSO = 3
 ROLLING = 4
-EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first guesses
-LONGEST_SWING = 12.0  # sqrt(L/g)
-FALLEN = 1.5  # rad, angle of the stance leg
+EXACT, QUICK = 1e-12, 1e-7  # relative tolerances for gaits and for first guesses
+LONGEST_SWING = 12.0  # sqrt(L/g), after which a swing is given up
+FALLEN = 1.5  # rad, angle of the stance leg at which the walker has fallen
 MAX_EULER_STEPS = 400_000
-LARGEST_STEP = 0.3  # sqrt(L/g)
-LOCATING_ROUNDS, TINY = 4, 1e-7  # s
+LARGEST_STEP = 0.3  # sqrt(L/g), largest step of the integration
+# rounds of Newton's method that locate an event, and the time (s) over which it takes the slope of the event function
+LOCATING_ROUNDS, TINY = 4, 1e-7
 STRAIGHT = "straight"
 BENT = "bent"
 """Phases of a swing: with a straight leg, and with a free knee."""
@@ -56,7 +57,7 @@ thigh, stance leg, swing shank, torso, and the ground on which the stance foot r
 
 
 class LegPart(NamedTuple):
-    """A rigid part of a leg. Positions are relative to its upper hinge, with the part upright."""
+    """A rigid part of a leg. Positions are relative to the part's upper hinge while the part is upright."""
 
     mass: float  # kg
     centre: complex  # m, centre of mass
@@ -71,13 +72,13 @@ class PlainWalker:
     """A walker on its slope, and the mistakes in its equations. SI units."""
 
     parts: tuple[LegPart, LegPart]  # parts of one leg: thigh and shank, or the whole leg and NO_PART
-    knee: complex  # m, from hip to knee; 0 for straight legs
+    knee: complex  # m, from hip to knee, or 0 for straight legs
     hip_mass: float
     foot: complex  # m, from hip to the centre of the foot's arc, leg upright
     radius: float
     gravity: float
     slope: float
-    torso: LegPart = NO_PART  # with positions relative to the hip
+    torso: LegPart = NO_PART  # positions are relative to the hip
     hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
     push_off: float = 0.0  # N s
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
@@ -85,12 +86,14 @@ class PlainWalker:
     # mistakes
     signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors on velocity terms, by phase
     keeps_trailing_rate: bool = False
-    extra_inertia: tuple[float, float] = (0.0, 0.0)  # weights of trailing and leading rate in an extra term I * rate
+    # weights of trailing and leading rate in an extra term I * rate of the strike's balance
+    extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
-    turned_on_it: bool = False  # whether the trailing leg turns about the same point of its own foot before the strike
+    # whether the trailing leg turned about the same point of its foot before the strike
+    turned_about_strike_foot: bool = False
     strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
-    window: float = 0.0  # rad, by which a touch is accepted early
-    euler_step: float = 0.0  # s, step of Euler's method; 0 for exact integration
+    window: float = 0.0  # rad, how early a touch is accepted
+    euler_step: float = 0.0  # s, step of Euler's method, or 0 for exact integration
     interpolates: bool = True  # whether Euler's method finds the strike between two steps
     evens_angles: bool = False  # whether a touch within the window puts both feet on the slope
 
@@ -128,9 +131,11 @@ class PlainWalker:
         return np.array([upper.inertia, self.leg_inertia, lower.inertia, self.torso.inertia, 0.0])
 
     def levers_about(self, foot: complex, radius: float) -> Complex:
-        """Return the levers (masses, bodies). The velocity of a mass is the sum of i lever exp(i psi) omega.
+        """Return the levers (masses, bodies) in m. The velocity of a mass is the sum of i lever exp(i psi) omega.
 
-        A foot of a radius rolls like a lever that keeps its direction.
+        A round foot that rolls acts like a lever that keeps its direction.
+
+        foot, radius  centre and radius of the arc on which the stance leg rolls (m)
         """
         upper, lower = self.parts
         levers = np.zeros((6, 5), complex)
@@ -148,17 +153,20 @@ class PlainWalker:
 
     @cached_property
     def moments(self) -> Complex:
-        """Moments of inertia (bodies, bodies) of the masses with two levers and, on the diagonal, of the bodies."""
+        """Sum over all masses of mass times two levers (bodies, bodies), plus the inertias of the bodies (kg m^2)."""
         return np.asarray(self.levers.conj().T * self.masses @ self.levers + np.diag(self.inertias))
 
     @cached_property
     def weights(self) -> Complex:
-        """Moments of the weight of all masses with the lever of each body."""
+        """Sum over all masses of weight times lever (bodies,) in N m, for the gravity terms of the equations."""
         return np.asarray(self.masses @ self.levers * np.conj(self.down))
 
     @cached_property
     def factors(self) -> dict[str, Floats]:
-        """Factors (bodies, bodies) on the velocity terms, by phase. A lever that does not turn has none."""
+        """Factors (bodies, bodies) on the velocity terms, by phase: 1, or -1 for a mistake in a sign.
+
+        The factor of the rolling is 0, because its lever does not turn.
+        """
         factors = {phase: np.repeat([[1.0, 1.0, 1.0, 1.0, 0.0]], 5, axis=0) for phase in REDUCTIONS}
         for (phase, row, column), factor in self.signs.items():
             factors[phase][row, column] = factor
@@ -167,13 +175,13 @@ class PlainWalker:
         return factors
 
     def bodies(self, phase: str, state: Floats) -> Floats:
-        """Return the angles and the rates (2, bodies) of all bodies."""
+        """Return the angles and rates of all bodies (2, bodies)."""
         bodies: Floats = np.reshape(state, (2, -1)) @ REDUCTIONS[phase].T
         bodies[0, ROLLING] = 0.0
         return bodies
 
     def mass_matrix(self, places: Complex, inertias: Floats) -> Floats:
-        """Return the mass matrix of all bodies from their turned levers."""
+        """Return the mass matrix of all bodies from their levers in the current pose, `places` (masses, bodies)."""
         return np.asarray((places.conj().T * self.masses @ places).real + np.diag(inertias))
 
     def rates(self, phase: str, state: Floats) -> Floats:
@@ -196,11 +204,11 @@ class PlainWalker:
         return -1j * self.gravity * cmath.exp(1j * self.slope)
 
     def swing_foot(self, state: Floats) -> complex:
-        """Return the position of the swing foot's centre relative to that of the stance foot, swing leg straight."""
+        """Return the position of the swing foot relative to the stance foot (arc centres, swing leg straight)."""
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return the sum (rad) of both legs' angles, hip to foot. It falls to the window, usually 0, at a touch."""
+        """Return the sum (rad) of the angles of both legs, from hip to foot, less the window. It is 0 at a touch."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
@@ -249,26 +257,26 @@ def name_balances(walker: PlainWalker) -> tuple[str, ...]:
 def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats]:
     """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
 
-    before  state just before it, swing leg straight
+    before  state just before the strike, swing leg straight
     """
     Z = REDUCTIONS[BENT if walker.free_at_strike else STRAIGHT]
     old_angles, old = walker.bodies(STRAIGHT, before)
     foot, radius = (walker.foot, walker.radius) if walker.strike_foot is None else (walker.strike_foot, 0.0)
-    pivot = (foot, radius) if walker.turned_on_it else (walker.foot, walker.radius)
+    pivot = (foot, radius) if walker.turned_about_strike_foot else (walker.foot, walker.radius)
     moving = walker.levers_about(*pivot) * np.exp(1j * old_angles) @ old
-    # the legs exchange their roles
+    # The legs exchange their roles, and the new swing leg is straight.
     angles, omega = (both[[STANCE, SWING, STANCE, TORSO, ROLLING]] for both in (old_angles, old))
     places = walker.levers_about(foot, radius) * np.exp(1j * angles)
     inertias = walker.inertias * [*[walker.strike_inertia] * 3, 1.0, 0.0]
-    # The masses of both legs change places, as their angles do above.
+    # The angles of the legs changed places above, so the masses must do so, too.
     momentum = (places.conj().T * walker.masses @ moving[[2, 3, 0, 1, 4, 5]]).real + inertias * omega
     if walker.push_off:
-        # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
+        # The impulse acts along the trailing leg, so it pushes only the hip, which moves with the stance leg.
         to_hip = -walker.foot * cmath.exp(1j * angles[SWING]) + 1j * walker.radius
         hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
         momentum[STANCE] += walker.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real
     n = Z.shape[1]
-    # whole walker, trailing leg and, if it is free, trailing shank
+    # rows: whole walker, trailing leg and, if its knee is free, trailing shank
     T = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]])[:n, :n] @ Z.T
     M = T @ walker.mass_matrix(places, inertias) @ Z
     momentum = T @ momentum
@@ -325,7 +333,12 @@ class PlainStep(NamedTuple):
 
 
 def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats | None:
-    """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
+    """Return the coordinates just after the heel strike at which a state is printed.
+
+    For a state in mid-stance, use the next heel strike. Return None if the walker does not reach it.
+
+    instant  instant at which the walker is in the state
+    """
     if instant == "after-strike":
         return coordinates(walker, state)
     n = len(state) // 2
@@ -336,7 +349,7 @@ def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats |
 
 
 def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
-    """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
+    """Take a step from coordinates just after a heel strike. Return None if the walker does not complete it.
 
     start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
     """
@@ -350,9 +363,9 @@ def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> P
 
 
 def land(walker: PlainWalker, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
-    """Return the parts of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
+    """Return the pieces of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
     pieces: tuple[Piece, ...] = ()
-    # A straight leg whose foot is behind the stance foot has just been released.
+    # If the leg is straight, its foot behind the stance foot shows that the knee has only just been released.
     if walker.kneed and (walker.knee_bend(state) != 0.0 or walker.swing_foot(state).real < 0.0):
         locked = swing_until(walker, BENT, state, walker.knee_bend, lambda _: True, tolerance)
         if locked is None:
@@ -370,7 +383,7 @@ def land(walker: PlainWalker, state: Floats, tolerance: float = EXACT) -> tuple[
 def swing_until(
     walker: PlainWalker, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
 ) -> Piece | None:
-    """Integrate until `event` falls to zero in a state for which `counts` is true. None if that never happens."""
+    """Integrate until `event` falls to zero in a state for which `counts` is true, or return None if it never does."""
     old_time = 0.0
     old = start
     before = event(start)
@@ -395,7 +408,7 @@ def swing_until(
 
 
 def course(walker: PlainWalker, phase: str, state: Floats, tolerance: float) -> Iterator[tuple[float, Floats]]:
-    """Yield time and state after each step of an integration."""
+    """Yield the time (s) and the state after each step of an integration, starting from `state` at time 0."""
     latest = LONGEST_SWING * walker.pendulum_time
     if walker.euler_step:
         for count in range(1, min(int(latest / walker.euler_step), MAX_EULER_STEPS)):
@@ -420,7 +433,11 @@ def new_solver(walker: PlainWalker, phase: str, state: Floats, end: float, toler
 def locate(
     walker: PlainWalker, phase: str, state: Floats, event: Event, move: float, tolerance: float
 ) -> tuple[float, Floats]:
-    """Find the time and state at which an event is zero, by Newton's method. The first guess is a time `move`."""
+    """Find the time and state at which an event is zero, by Newton's method.
+
+    state  state at time 0
+    move   first guess of the time (s)
+    """
     time = 0.0
     for _ in range(LOCATING_ROUNDS):
         time += move
@@ -446,10 +463,10 @@ def why_not_plain(config: RigidConfig) -> str:
 
 
 def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
-    """Build the plain model of a config's walker, or of a changed one on its slope."""
+    """Build the plain model of a config's walker. If `changed` is given, that walker stands on the slope instead."""
     walker = changed or config.walker
     assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
-    # the compass rolls on its ball feet in the contact model only
+    # Only the contact model lets the compass roll on its ball feet.
     radius = 0.0 if isinstance(walker, CompassWalker) else walker.foot_radius_m
     torso = walker.torso
     plain = PlainWalker(
@@ -480,16 +497,16 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
 
 
 class Mistake(NamedTuple):
-    """A mistake that is known from publications and programs."""
+    """A mistake known from publications and programs."""
 
-    what: str  # ends a sentence that begins with 'All printed values follow if'; {} stands for the size
-    of_size: Callable[[float], PlainWalker]  # walker with the mistake
-    first: float = 0.0  # initial size, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest; smaller ones are within a program's errors
+    what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
+    of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
+    first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
+    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest size: smaller ones hide in errors of a program
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
-    """Yield all known mistakes in programs for a walker."""
+    """Yield all known mistakes that a program for the walker may contain."""
 
     def mistake(what: str, **changes: Any) -> Mistake:
         return Mistake(what, lambda _: replace(right, **changes))
@@ -517,7 +534,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
         for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
             what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
             yield mistake(what, strike_foot=point)
-            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
+            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_about_strike_foot=True)
     if right.hip_mass:
         yield mistake("the hip's mass counts once for each leg", hip_mass=2.0 * right.hip_mass)
     early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"
@@ -533,7 +550,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield velocity terms in the equations of motion that may have a wrong sign, with a description."""
+    """Yield the velocity terms in the equations of motion whose signs may be wrong together, with a description."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}

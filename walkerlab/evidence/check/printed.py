@@ -1,4 +1,4 @@
-"""Printed numbers next to the right ones: the number of digits that agree, and the verdict."""
+"""Comparison of printed numbers with the right ones: how many digits agree, and the verdict."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from walkerlab.config.check import Digits, PrintedValue, agreement, parse_printe
 from walkerlab.labels import axis_label
 
 UNEXPLAINED = "different, unexplained"
-# At least this many digits must agree, and at least half of them, where the last ones may differ.
+# A value counts as reproduced if at least this many of its digits agree, and at least half of them.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
-"""Numerical error of right values (relative to 1 or to the value) by quantity; of all others `EXACT_ERROR`."""
-EXACT_ERROR = 2e-12
+"""Numerical error of right values by quantity, as in `EXACT_ERROR`, which holds for all other quantities."""
+EXACT_ERROR = 2e-12  # numerical error of right values, absolute below 1 and relative above
 MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
 MOST_DECIMALS: Final = 12
 
 
 class Verdict(StrEnum):
-    """Verdict on a printed number. Some are for the study alone, which has its own scene and contradictions."""
+    """Verdict on a printed number. Some apply only to the study of the paper."""
 
-    INPUT = "input"  # of the study: used as given
+    INPUT = "input"  # only in the study: used as given
     REPRODUCED = "reproduced"
     EXPLAINED = "explained"
-    CONTRADICTED = "contradicted"  # of the study: different, by its own values
+    CONTRADICTED = "contradicted"  # only in the study: other values of the paper contradict it
     DIFFERENT = "different"
-    NOT_REPRODUCED = "not-reproduced"  # of the study: different and unexplained, or not comparable
+    NOT_REPRODUCED = "not-reproduced"  # only in the study: different and unexplained, or not comparable
     NOT_COMPARABLE = "not-comparable"
 
 
@@ -67,7 +67,7 @@ class PrintedNumber:
         return max(0.5 * (high - low), self.digits.unit) if math.isfinite(high - low) else self.digits.unit
 
     def agreeing(self, right: complex) -> int:
-        """Count the printed digits that agree with the right value, rounded or truncated."""
+        """Count the printed digits that agree with the right value, which may be rounded or truncated."""
         error = OWN_ERROR.get(self.quantity, EXACT_ERROR) * max(1.0, abs(right))
         if self.printed.bounds is not None:
             low, high = self.printed.bounds
@@ -83,7 +83,10 @@ class PrintedNumber:
         return right is not None and self.agreeing(right) == self.count
 
     def miss(self, right: complex | None) -> float:
-        """Return the distance of a value from the printed one in units of its last digit, or of half its bounds."""
+        """Return the distance of a value from the printed one, in units of the last printed digit.
+
+        If bounds are printed, it is the distance from them, in the units of `last_digit`.
+        """
         if right is None:
             return math.inf
         if self.printed.bounds is not None:
@@ -108,13 +111,13 @@ class Item(PrintedNumber):
     """A printed number of a gait: a value, or one component of a list."""
 
     name: str  # such as period_s, state.stance_angle or multipliers.1
-    quantity: str  # name without its component
-    place: int  # index of the component
+    quantity: str  # the name without the part after the dot
+    place: int  # index in the list of this quantity, or 0 for a single value
     text: str
 
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
-    """Return how many digits of a printed number agree with the right one, within the error of the right one."""
+    """Return how many digits of a printed number agree with the right one, which has a numerical error of `error`."""
     if agreement(printed, right, error):
         return printed.count
     difference = abs(right - printed.value)
@@ -137,14 +140,14 @@ class Judged:
     """A printed number, what it was compared with, and the verdict."""
 
     number: PrintedNumber
-    about: Mapping[str, Any]  # JSON values by name: what the number is, and in `values` what it was compared with
-    values: Mapping[str, Any]
+    about: Mapping[str, Any]  # JSON values that say what the number is
+    values: Mapping[str, Any]  # JSON values with which it was compared
     verdict: Verdict
     evidence: str
 
     @property
     def row(self) -> dict[str, Any]:
-        """Row of a table, as JSON values."""
+        """Row of a table, with JSON values."""
         verdict = {"verdict": self.verdict.value, "evidence": self.evidence}
         return {**self.about, "printed": self.number.text, **self.values, **verdict}
 
@@ -183,7 +186,11 @@ def format_units(number: float) -> str:
 
 
 def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> list[Item]:
-    """List the printed numbers. `names` has those of the components of lists, by quantity."""
+    """List the printed numbers.
+
+    printed  texts by quantity, each a single text or a list
+    names    names of the components of a list, by quantity. Other components are numbered
+    """
     items = []
     for quantity, texts in printed.items():
         if isinstance(texts, str):

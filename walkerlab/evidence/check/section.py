@@ -17,8 +17,8 @@ TONES: Mapping[str, Tone] = {
     Verdict.DIFFERENT: "bad", Verdict.NOT_REPRODUCED: "plain", Verdict.NOT_COMPARABLE: "plain",
 }  # fmt: skip
 """Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
-MANY_UNITS = 1e5
-LONGEST_LIST = 2  # angles and rates that are listed one by one
+MANY_UNITS = 1e5  # a difference of more units of the last digit is not shown
+LONGEST_LIST = 2  # longer states are mentioned as a whole, if they are complete
 COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),
@@ -28,8 +28,8 @@ COLUMNS = (
 )
 
 
-def is_short(row: Row) -> bool:
-    """Whether a value is reproduced, but not in all of its digits."""
+def is_partly_reproduced(row: Row) -> bool:
+    """Whether a value counts as reproduced although its last digits differ."""
     return bool(row["verdict"] == Verdict.REPRODUCED and row["digits"] < row["of_digits"])
 
 
@@ -37,11 +37,15 @@ def agreeing_digits(row: Row) -> str:
     if row["printed"].startswith(("<", ">")):
         return ""
     agreeing = f"{row['digits']} of {row['of_digits']}"
-    return f"{agreeing}, off by {format_units(row['difference_in_units'])} units" if is_short(row) else agreeing
+    return (
+        f"{agreeing}, off by {format_units(row['difference_in_units'])} units"
+        if is_partly_reproduced(row)
+        else agreeing
+    )
 
 
 def verdict_of(row: Row) -> str:
-    return f"{Verdict.REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
+    return f"{Verdict.REPRODUCED} to {row['digits']} digits" if is_partly_reproduced(row) else row["verdict"]
 
 
 def answer(summary: Row) -> list[str | Table]:
@@ -76,7 +80,7 @@ def headline(summary: Row) -> str:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
     if finding == Verdict.REPRODUCED:
         compared = count(verdicts.count(Verdict.REPRODUCED), "printed value")
-        short = sum(map(is_short, rows))
+        short = sum(map(is_partly_reproduced, rows))
         if not short:
             return f"Right: {compared} reproduced to the last digit."
         verb = "agrees" if short == 1 else "agree"
@@ -95,7 +99,7 @@ def headline(summary: Row) -> str:
 
 
 def follow(explanation: Row, rows: Sequence[Row]) -> str:
-    """Describe the printed values that follow from an explanation, and those that do not."""
+    """Write a sentence on the printed values that follow from an explanation, and those that do not."""
     names = explanation["reproduces"]
     cause = f"to the last digit if {explanation['what']}"
     if len(names) == len(rows):
@@ -106,7 +110,10 @@ def follow(explanation: Row, rows: Sequence[Row]) -> str:
 
 
 def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
-    """Enumerate printed values. A long state that is complete is mentioned as a whole."""
+    """Enumerate printed values in words. A long state that is complete is mentioned as a whole.
+
+    rows  rows of all printed values
+    """
     state = [row["name"] for row in rows if row["name"].startswith("state.")]
     whole = len(state) > LONGEST_LIST and set(state).issubset(names)
     words = [spell_name(name) for name in names if not (whole and name in state)]

@@ -1,7 +1,7 @@
 """Appendix A of the paper: the compass walker's equations as printed, and with C_21 corrected.
 
-Tests check the rigid model, assembled from parts (physics/mechanics), against these equations, and against those for
-energies, forces and the foot's height, which only the tests contain. The set `as-printed` uses the printed sign.
+Tests check the rigid model, which is assembled from parts (physics/mechanics), against these equations. The equations
+for energies, forces and the height of the foot are only in the tests. The set `as-printed` uses the printed sign.
 
 State (theta_1 swing, theta_2 stance, dtheta_1, dtheta_2): absolute angles from the vertical, counter-clockwise
 positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
@@ -28,7 +28,7 @@ class RigidWalker(NamedTuple):
     foot_to_mass: float  # [a] m
     leg_mass: float  # [m] kg
     hip_mass: float  # [M_H] kg
-    leg_inertia: float  # [J] kg m^2, about the leg's own centre of mass
+    leg_inertia: float  # [J] kg m^2, about the centre of mass of the leg
     gravity: float  # [g] m/s^2
     slope: float  # [phi] rad, positive downhill in +x
     c21_sign: float  # sign of C_21: CORRECTED, or AS_PRINTED in (A.5)
@@ -60,7 +60,7 @@ def swing_constants(walker: RigidWalker) -> Swing:
 def accelerations(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float]:
-    """Angular accelerations (rad/s^2) of swing and stance leg: D^-1 (-C dq - G), (A.4) to (A.6) and (A.58)."""
+    """Return the accelerations (rad/s^2) of swing and stance leg: D^-1 (-C dq - G), (A.4) to (A.6) and (A.58)."""
     c = swing_constants(walker)
     s1, c1 = sine_cosine(theta_1)
     s2, c2 = sine_cosine(theta_2)
@@ -74,15 +74,15 @@ def accelerations(
 
 
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Distance (m) along the slope between the feet when both are on it: 2 L sin((theta_2 - theta_1)/2)."""
+    """Return the distance (m) of the feet when both are on the slope: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
-    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-. Legs 1 and 2 are numbered as before the impact.
+    """Return the entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-. Legs keep their numbers in the impact.
 
     They follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the impulse.
-    With the right sign in (A.55) they depend on cos(theta_2 - theta_1) alone, and B_21 = 0 because the trailing leg
+    With the right sign in (A.55) they depend only on cos(theta_2 - theta_1). B_21 is 0, because the trailing leg
     keeps its angular momentum about the hip.
     """
     c = swing_constants(walker)
@@ -100,7 +100,7 @@ def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, fl
 def impact(
     walker: RigidWalker, theta_1: float, theta_2: float, omega_1: float, omega_2: float
 ) -> tuple[float, float, float, float]:
-    """State after the heel strike, with the roles exchanged: theta_2 is the former swing leg."""
+    """Return the state after the heel strike, with the roles of the legs exchanged: theta_2 is the former swing leg."""
     s1, c1 = sine_cosine(theta_1)
     s2, c2 = sine_cosine(theta_2)
     A_11, A_12, A_22, B_11, B_12, B_22 = impact_matrices(walker, c1 * c2 + s1 * s2)

@@ -69,8 +69,9 @@ def times_of_steps(walk: Content, name: str) -> comparison.Array:
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
-    """Return the motion of the legs in a stored walk, or None if states were not stored or the walk ended
-    immediately.
+    """Return the motion of the legs in a stored walk.
+
+    Return None if states were not stored or the walk ended immediately.
     """
     angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
@@ -87,14 +88,14 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 class Comparison:
     """Difference between the walks of both models."""
 
-    errors: Errors  # differences by alignment; alignments that cannot be compared are absent
-    orbit: list[float] | None = None  # distance between the orbits of each leg; None if no stride was completed
+    errors: Errors  # differences by alignment, without alignments that cannot be compared
+    orbit: list[float] | None = None  # distance between the two orbits, by leg, or None if no stride was completed
     groups: Mapping[str, Group] = field(default_factory=dict)
     left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Largest errors of both legs by alignment, or None for an alignment without a comparison."""
+        """Largest errors of both legs by alignment, or None for an alignment that could not be compared."""
         errors: dict[str, Any] = {}
         for name, quantity in QUANTITY_KEYS.items():
             per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
@@ -106,7 +107,7 @@ class Comparison:
 def compare_motion(
     rigid: comparison.Motion | None, contact: comparison.Motion | None, meaning: str = "contact less rigid model"
 ) -> Comparison:
-    """Compare two walks in time, in phase and as orbits, second minus first. `meaning` describes the difference."""
+    """Compare two walks at equal times, at equal phases and as orbits. `meaning` describes the difference in words."""
     if rigid is None or contact is None:
         why = "states of both walks are not available: outputs omits them, or a walk ended immediately"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
@@ -149,7 +150,10 @@ def select(difference: comparison.WalkDifference, where: Any) -> comparison.Walk
 def differences(
     way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], meaning: str
 ) -> dict[str, Variable]:
-    """Return differences of angles and velocities as variables to store. `way` is their alignment."""
+    """Return differences of angles and velocities as variables to store.
+
+    way  name of the alignment, as in `ALIGNMENTS`
+    """
     return {
         f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
         f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),
@@ -160,7 +164,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Return groups and summary of the recorded walk's differences from each model, or () if no walk was recorded."""
+    """Compare the recorded walk with both models, and return groups and summary. Both are empty without a recording."""
     recorded = inputs.get("recorded-walk")
     if recorded is None:
         return {}, {}
@@ -199,7 +203,7 @@ def stored_energy(walk: Content) -> EnergyRecord | None:
 
 
 RELEASES = {"compression": False, "touch": True}
-"""Values of the config's `release`, and whether each releases the knee at the leading foot's first touch."""
+"""Values of the key `release`, and whether each of them releases the knee when the leading foot first touches."""
 CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
 RIGID_TOLERANCES = Tolerances("dop853", 1e-8, 1e-10, 2_000_000)
@@ -212,10 +216,13 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Simulate up to 20 steps from a gait with each moment of the trailing knee's release.
+    """Simulate up to 20 steps from a gait for each moment at which the trailing knee may be released.
 
-    Each walk is compared with the corresponding rigid model, in which a knee released during compression is rigid in
-    the impact, and a knee released at first touch is free.
+    Each walk is compared with the corresponding rigid model: its knee is locked during the impact if it is released
+    during compression, and free if it is released at first touch.
+
+    state    gait of the rigid model
+    pitch_m  pitch of the pads
 
     Returns None for walkers without knees, with a push-off or with legs that differ.
     """
@@ -236,7 +243,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 
 def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
+    """Summarise a walk: outcome, last step with knee strike, and energy dissipated per step by channel."""
     steps = walk.steps
     lost = losses_by_channel(scene.walker, walk.dissipated_J)
     return {
@@ -249,7 +256,7 @@ def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     }
 
 
-START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
+START_TOLERANCE = 1e-6  # rad and rad/s, distance from the fixed point above which a start counts as moved
 PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
     "why": "they apply only to the paper's walker on even ground",
@@ -279,7 +286,7 @@ COLUMN_NAMES = {
     "verdict": ", ".join(VERDICTS),
     "evidence": "evidence",
 }
-"""Long names of the columns in the paper's numbers and tables."""
+"""Long names of the columns in the tables of the paper and of all its numbers."""
 
 
 def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -307,7 +314,7 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
 def compare_with_paper(
     config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
 ) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Compare both models with the paper's numbers, tables and errata, and return groups and summary."""
+    """Compare both models with the numbers and tables of the paper, list its errata, and return groups and summary."""
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
@@ -351,7 +358,7 @@ def summarise_models(config: CompareConfig, inputs: Mapping[str, Content]) -> di
 
 
 def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
-    """Make the measurements that are compared with the paper's numbers."""
+    """Make the measurements with which the numbers of the paper are compared."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
     models: dict[str, RigidMeasurements] = {
@@ -374,13 +381,13 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
-    """Measure the contact model's counterparts of the paper's ADAMS numbers."""
+    """Measure the values of the contact model that correspond to the ADAMS numbers of the paper."""
     summary = walk.summary
     pitch = float(walk.summary["pitch_m"])
     lengths = np.array(summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
     angle = stored_variable(walk, "trajectory", "angle")
-    # walk from the printed x_p, with the swing angle that puts both feet on the config's slope
+    # Start from the printed x_p, but with the swing angle that puts both feet on the slope of the config.
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch, pitch)
     start = start_state(scene, (-2.0 * config.slope_rad - theta_2, theta_2, omega_1, omega_2))
@@ -419,7 +426,7 @@ def list_omissions(inputs: Mapping[str, Content], measured: Measured) -> list[di
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
     """Build a group with the numbers of the paper and of the models.
 
-    The column of a model has only the rows with a value, which its coordinate lists. Text columns have all rows.
+    Text columns have all rows. The column of a model has only the rows with a value, whose indices are its coordinate.
 
     names  symbols of the rows, if they have any
     """

@@ -17,7 +17,7 @@ STAGES = (
     ),
     Stage(
         "tune", "walkerlab.evidence.paper.tune",
-        "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
+        "Adjust the initial velocities until the contact model walks, and report how much was needed and why.",
         reads.TuneConfig, results_of("fixedpoint"), requires=("contact",), needed_by=("report",), shown_by=("plot",),
         needs_equal_legs=True,
         does_without=lazy_function("walkerlab.evidence.paper.omissions:adjustment_omissions"),

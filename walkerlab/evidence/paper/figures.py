@@ -19,9 +19,9 @@ PAPER_ERROR: Final = Look("largest error in the paper", GREY, ":", 1.6, "", orde
 AXIS_MARGIN = 3.0
 """Factor between the extreme errors and the ends of the axis."""
 ZERO_CROSSING = 1e-3
-"""Smallest error shown, as a fraction of the largest; errors vanish where the difference changes sign."""
+"""Smallest error shown, as a fraction of the largest. Where the difference changes sign, errors fall to zero."""
 LEG_QUANTITIES = (("a", "angle", "angle_error_rad"), ("b", "angular velocity", "velocity_error_rad_s"))
-"""Compared quantities: panel letter, name, and error variable, which is stored as raw_NAME and as aligned_NAME."""
+"""Compared quantities: letter of the panel, name, and NAME of the error, stored as raw_NAME and as aligned_NAME."""
 RAW_ERRORS = Need(
     walks.COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), walks.NO_STATES
 )
@@ -74,8 +74,9 @@ def draw_differences(results: Results) -> Drawn:
 
 
 def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str, float, str]]] | None:
-    """Return the recorded walk's name and its largest differences from the rigid one in phase, or None if
-    not recorded.
+    """Return the name of the recorded walk and its largest differences from the rigid walk in phase.
+
+    Return None if no walk was recorded.
     """
     if not summary:
         return None
@@ -115,7 +116,7 @@ def draw_limit(results: Results) -> Drawn:
     """Plot errors over run time, one point per setting, from the config's contact to the most rigid one."""
     figure = blank(3.6)
     claimed = bool(walks.claims_in(results))
-    # the series with point feet is absent for walkers whose feet roll in both models
+    # Walkers whose feet roll in both models have no series with point feet.
     stored = results[walks.TUNE_STAGE].groups
     stored_series = [
         (stored[name], title) for name, title in LIMITS if name in stored and ALIGNED_ANGLE in stored[name].variables

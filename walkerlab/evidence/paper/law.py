@@ -1,6 +1,7 @@
-"""The parts of scenes that the study defines (see scene/studies.py): its walker, and Appendix A's sign error.
+"""The parts of scenes that the study defines (see scene/studies.py): its walker, and the sign error of Appendix A.
 
-Results with the equations as printed depend on this file, so the rest of the study is in other files.
+Results with the equations as printed depend on this file. The rest of the study is in other files, so that a change
+there does not make these results out of date.
 """
 
 from typing import Any
@@ -11,7 +12,7 @@ from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 
 
 def is_own_walker(config: Any) -> bool:
-    """Whether a config has the paper's walker, up to rounding of its values."""
+    """Whether a config has the walker of the paper, up to rounding of values."""
     walker = config.walker
     paper = CompassWalker()
     return is_passive_compass(config) and all(

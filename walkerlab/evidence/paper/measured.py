@@ -1,6 +1,6 @@
-"""Measurements to compare with the printed numbers: both sets of rigid equations, and the contact model.
+"""Measurements to compare with the printed numbers: from both sets of rigid equations, and from the contact model.
 
-If a config's scene departs from the paper's, its numbers neither confirm nor refute the paper's.
+Measurements on another scene than that of the paper neither confirm nor refute its numbers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -39,18 +39,18 @@ ENERGY_STEPS = 5  # steps over which the paper averages the energy
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Quantities of Table 3, SI units, or None if the walk or its record is too short."""
+    """Quantities of Table 3 in SI units. They are None if the walk or its record is too short."""
 
     t_left: float | None  # period of the first step of the last completed stride
     t_right: float | None  # period of the second step of that stride
     t_cycle: float | None  # sum of both periods
     v_com: float | None  # length of that stride along the slope, divided by t_cycle
-    # time mean of kinetic plus potential energy over several steps, with heights from the current stance foot
+    # time mean of kinetic and potential energy over several steps, with heights from the current stance foot
     E_avg: float | None
 
 
 def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -> Characteristics:
-    """Compute Table 3 from the periods (s) and lengths (m) of a walk's steps and its mean energy (J)."""
+    """Compute the quantities of Table 3 from step periods (s), step lengths (m) and the mean energy (J) of a walk."""
     strides = len(periods) // 2
     if strides == 0:
         first = float(periods[0]) if len(periods) else None
@@ -71,8 +71,9 @@ class EnergyRecord:
 
 
 def mean_over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
-    """Average a sampled energy (J) over the last five completed steps (all if fewer), or return None if no step was
-    completed.
+    """Average a sampled energy (J) over the last five completed steps, or over all if there are fewer.
+
+    Return None if no step was completed.
     """
     if step_ends.size == 0:
         return None
@@ -87,7 +88,7 @@ def mean_over_last_steps(time: Array, energy: Array, step_ends: Array) -> Energy
 
 @dataclass(frozen=True)
 class RigidMeasurements:
-    """Gait of one set of equations, and a walk from it."""
+    """Measurements on the gait of one set of equations, and on a walk from it."""
 
     state: State  # fixed point, rad and rad/s
     steps: int  # completed steps, out of ten
@@ -99,7 +100,7 @@ class RigidMeasurements:
 
 
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
-    """Simulate five cycles from the fixed point of a gait. Energies are measured from the current stance foot."""
+    """Simulate five cycles from the fixed point `state`. Heights are measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * PAPER_CYCLES, sampled=True)
     assert walk.samples is not None
@@ -117,16 +118,16 @@ def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
 
 @dataclass(frozen=True)
 class ContactMeasurements:
-    """Walk of the contact model, for comparison with the paper's ADAMS model."""
+    """Measurements on the contact model, for comparison with the ADAMS model of the paper."""
 
     law: Contact  # contact block of the config
     foot_radius: float  # m
     summary: Mapping[str, Any]  # stored summary of the walk
-    start: State | None  # initial rigid state, rad and rad/s; None if states were not stored
+    start: State | None  # initial rigid state, rad and rad/s, or None if states were not stored
     table_3: Characteristics
-    step_length: float | None  # m, mean over the last completed stride; None if no stride was completed
-    energy: EnergyRecord | None  # energy over the last five steps; None if energies were not stored
-    from_x_p: tuple[int, str]  # completed steps, out of ten, of a walk from the printed x_p, and its outcome
+    step_length: float | None  # m, mean over the last completed stride, or None if no stride was completed
+    energy: EnergyRecord | None  # energy over the last five steps, or None if energies were not stored
+    from_x_p: tuple[int, str]  # walk of up to ten steps from the printed x_p: completed steps and outcome
 
     @property
     def steps(self) -> int:
@@ -142,14 +143,14 @@ Errors = Mapping[str, WalkDifference]
 
 raw              at the same time
 aligned          at the same phase of each step
-between_impacts  aligned, without the start of each step, when a compliant impact is still in progress
-settled          between_impacts, for the last completed stride only
+between_impacts  as aligned, but without the start of each step, while a compliant impact is still in progress
+settled          as between_impacts, but only for the last completed stride
 """
 
 
 @dataclass(frozen=True)
 class Departures:
-    """Descriptions of the differences between a scene and the paper's scene."""
+    """How a scene differs from that of the paper, in words."""
 
     rigid: tuple[str, ...]  # differences of the rigid model
     contact: tuple[str, ...]  # differences of the contact model, including those of the rigid model
@@ -161,7 +162,7 @@ class Measured:
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidMeasurements]  # measurements by set of equations, for sets that have a gait
+    models: Mapping[str, RigidMeasurements]  # by set of equations, without sets that have no gait
     spectral_radii: Mapping[str, float]  # spectral radii of these gaits, by set of equations
     contact: ContactMeasurements
     errors: Errors
@@ -169,7 +170,7 @@ class Measured:
 
     @property
     def raised(self) -> list[float | None]:
-        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
+        """How much larger (%) each coordinate of the contact model's start is than that of the rigid gait."""
         gait = self.models.get(self.equations)
         start = self.contact.start
         if gait is None or start is None:
@@ -179,7 +180,7 @@ class Measured:
 
     @property
     def speed_differences(self) -> dict[str, float]:
-        """Difference (%) of the contact model's average velocity from the rigid model's, by set of equations."""
+        """Difference (%) of the average velocities of contact and rigid model, by set of equations."""
         contact = self.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.models.items()}
         return {
@@ -197,7 +198,10 @@ UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not i
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """Describe the differences from the paper's scene. Slopes that agree within the rounding of x_p count as equal."""
+    """Describe how the scene differs from that of the paper. Slopes within the rounding of x_p count as equal.
+
+    start_moved  whether the contact model starts away from the fixed point of the rigid model
+    """
     walker = config.walker
     contact = config.contact
     paper = CompassWalker()
@@ -238,7 +242,7 @@ def describe(name: str, *values: Any) -> str:
     return f"{name} {used} instead of {paper}"
 
 
-FALLING = 4  # number of last samples in the cubic fit of a falling hip's height
+FALLING = 4  # a cubic through this many last samples extrapolates the height of a falling hip
 
 
 @dataclass(frozen=True)
@@ -250,7 +254,7 @@ class AdamsStart:
     energy: float  # J, kinetic plus potential energy, with heights measured from the stance foot
     weight: float  # N
     normal_force: float  # N, normal force of the ground at the start
-    pull_from: float | None  # s, time from which the ground would have to pull; None if never
+    pull_from: float | None  # s, time from which the ground would have to pull, or None if never
     heel_strikes: int  # number of heel strikes in the walk
     end: str  # outcome of the walk
     end_time: float  # s
@@ -263,7 +267,7 @@ class AdamsWalk:
     terrain: str  # terrain of the contact model
     rigid: AdamsStart  # walk of the rigid model from the same start, both feet on the config's slope
     walk: ContactWalkResult
-    airborne_from: float | None  # s, first time at which no foot of the contact model touches the ground; None if never
+    airborne_from: float | None  # s, first time at which no foot touches the ground, or None if one always does
     # N, largest normal force of the contact model after the rigid model's ground would have to pull
     later_normal_force: float | None
     normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model
@@ -301,8 +305,9 @@ def adams_start(walker: RigidModel, state: State) -> AdamsStart:
 def adams_walk(
     walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
 ) -> AdamsWalk:
-    """Simulate the contact model from the ADAMS start of Table 2: its stance angle and velocities, on the walker's
-    slope.
+    """Simulate both models from the ADAMS start of Table 2.
+
+    The stance angle and the velocities are the printed ones. The swing angle puts both feet on the slope of the walker.
 
     walk     function that simulates the contact model from a rigid start state, with samples
     terrain  terrain of the contact model, as named in the config
@@ -328,7 +333,7 @@ def adams_walk(
 
 
 def first_below_zero(time: Array, values: Array) -> float | None:
-    """Return the interpolated time (s) at which sampled values first cross zero downwards, or None if they do not."""
+    """Return the interpolated time (s) at which sampled values first fall below zero, or None if they never do."""
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None

@@ -1,4 +1,4 @@
-"""Parts of the paper's adjustment that do not apply to a config, known before anything is loaded or run."""
+"""Parts of the paper's adjustment that do not apply to a config. They are known before anything is loaded or run."""
 
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import is_passive_compass

@@ -1,5 +1,6 @@
-"""Numbers printed in the paper, with their sources, the walker that they describe, and where they contradict
-each other, allowing for their rounding.
+"""Numbers printed in the paper, and what follows from them: the walker that they describe, and their contradictions.
+
+Numbers contradict each other only if their rounding does not explain the difference.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,21 +23,21 @@ COORDINATE_UNITS: Final = ("rad", "rad", "rad/s", "rad/s")
 
 @dataclass(frozen=True)
 class Printed(PrintedNumber):
-    """Number printed in the paper."""
+    """A number printed in the paper."""
 
-    where: str  # equation, table, figure or section
+    where: str  # location in the paper: equation, table, figure or section
     quantity: str
     unit: str
     text: str
 
     @property
     def rounding(self) -> tuple[float, float]:
-        """Smallest and largest value that round to the printed one."""
+        """Smallest and largest value that are rounded to the printed one."""
         half = 0.5 * self.digits.unit
         return self.value - half, self.value + half
 
     def agreement(self, value: float | None) -> str:
-        """Agreement of a value with the printed digits: 'rounded', 'cut off', or '' if it disagrees."""
+        """Return how a value agrees with the printed digits: 'rounded', 'cut off', or '' if it does not."""
         return "" if value is None else agreement(self.digits, value)
 
 
@@ -96,7 +97,7 @@ TABLE_2: Final = tuple(
         ("dtheta_2", X_P[3], "-3.20", "Table 2, section 4", "+74%"),
     )
 )
-"""The MATLAB column is x_p; section 4 repeats the percentages of the velocities."""
+"""The MATLAB column is x_p. Section 4 repeats the percentages of the velocities."""
 
 
 TABLE_3: Final = tuple(
@@ -125,7 +126,7 @@ DYNAMIC_FRICTION: Final = Printed("section 4, Fig. 4b", "dynamic friction", "1",
 LOST_BALANCE: Final = Printed("section 4", "steps until balance was lost, from MATLAB's initial conditions", "1", "one")
 CYCLES_WALKED: Final = Printed("section 5, Fig. 7", "gait cycles walked", "1", "five")
 LARGEST_ERROR: Final = Printed("section 5, Fig. 8", "largest error, angles and velocities", "rad, rad/s", "10^-4")
-"""Single value for both angles and velocities."""
+"""The paper gives one value for angles and velocities together."""
 STEP_LENGTH: Final = Printed("section 5", "length of one complete step", "m", "0.0342")
 VELOCITY_DIFFERENCE: Final = Printed("section 5", "difference of the average velocities", "%", "less than 1%")
 
@@ -134,48 +135,52 @@ EQUATION_NUMBERS: Final = (*range(1, 42), *range(55, 59))
 
 
 def fixed_point_as_printed() -> tuple[float, float, float, float]:
-    """Fixed point x_p of eq. 11 (rad, rad/s)."""
+    """Return the fixed point x_p of eq. 11 (rad, rad/s)."""
     theta_1, theta_2, omega_1, omega_2 = (entry.value for entry in X_P)
     return theta_1, theta_2, omega_1, omega_2
 
 
 def adams_start_as_printed() -> tuple[float, float, float, float]:
-    """Start of the ADAMS model in Table 2 (rad, rad/s)."""
+    """Return the start of the ADAMS model in Table 2 (rad, rad/s)."""
     theta_1, theta_2, omega_1, omega_2 = (row.adams.value for row in TABLE_2)
     return theta_1, theta_2, omega_1, omega_2
 
 
 def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
-    """Slope (rad) on which both feet of a printed state stand, and its uncertainty due to rounding."""
+    """Return the slope (rad) on which both feet of a printed state stand, and the uncertainty due to rounding."""
     return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.digits.unit + theta_2.digits.unit)
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
-    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg. `c21_sign` is CORRECTED or AS_PRINTED."""
+    """Return the walker of Table 1 on the slope of x_p, with masses at mid-leg.
+
+    c21_sign  CORRECTED or AS_PRINTED
+    """
     length, mass, hip, gravity = (entry.value for entry in TABLE_1)
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
 
 
 def speed_as_printed(cycle: float) -> float:
-    """Speed (m/s) as section 5 computes it: the printed step length divided by the time (s) of a cycle."""
+    """Return the speed (m/s) as section 5 computes it: the printed step length divided by the time of a cycle (s)."""
     return STEP_LENGTH.value / cycle
 
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
-    """Relative difference (%) of the speeds implied by two cycle times (s)."""
+    """Return the relative difference (%) of the speeds that section 5 would compute from two cycle times (s)."""
     matlab = speed_as_printed(matlab_cycle)
     adams = speed_as_printed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 
 def softening_in_metres() -> float:
-    """Return the factor by which a default stiffness of ADAMS is lower in a model in metres than in millimetres."""
+    """Return by which factor an ADAMS default of the stiffness is lower in metres than in millimetres."""
     return float(MM_PER_M ** (Contact().exponent - 1.0))
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
-    """Return the paper's resting foot for three readings of Fig. 4b: in N, mm and s, in SI, and as ADAMS defaults in
-    metres.
+    """Return how a foot rests on the ground for three readings of Fig. 4b.
+
+    They are in N, mm and s, in SI, and as the defaults of an ADAMS model in metres.
 
     Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.
@@ -196,12 +201,15 @@ Interval = tuple[float, float]
 
 @cache
 def contradictions() -> MappingProxyType[Printed, str]:
-    """Return the printed values that other values of the paper contradict, each with the computation."""
+    """Return the printed values that other values of the paper contradict, each with the computation that shows it."""
     return MappingProxyType(dict([*percentages(), *steps_of_a_cycle(), *lengths_and_speeds(), start_error()]))
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
-    """Return the range of a function, monotonic in each argument, over all values that round to the printed ones."""
+    """Return the range of a function over all values that are rounded to the printed ones.
+
+    The function must be monotonic in each argument.
+    """
     values = [function(*corner) for corner in product(*(entry.rounding for entry in entries))]
     return min(values), max(values)
 
@@ -211,10 +219,10 @@ def are_disjoint(first: Interval, second: Interval) -> bool:
 
 
 def percentages() -> Iterator[tuple[Printed, str]]:
-    """Yield the percentages of Table 2 that are not relative to the MATLAB column, each with the computation."""
+    """Yield the percentages of Table 2 that are not relative to the MATLAB column, each with the right computation."""
     for row in TABLE_2:
         low, high = percent_left_open(row)
-        # the signs of the column follow no rule, so magnitudes are compared
+        # The signs of the column follow no rule, so only magnitudes are compared.
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
         if are_disjoint((smallest, max(abs(low), abs(high))), row.percent.rounding):
             change = (
@@ -224,12 +232,12 @@ def percentages() -> Iterator[tuple[Printed, str]]:
 
 
 def percent_left_open(row: StartRow) -> Interval:
-    """Return the change in magnitude from MATLAB's to ADAMS's value (%), as the interval that their rounding allows."""
+    """Return the interval (%) of the change in magnitude from MATLAB to ADAMS that rounding leaves open."""
     return interval(lambda adams, matlab: 100.0 * (abs(adams) / abs(matlab) - 1.0), row.adams, row.matlab)
 
 
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
-    """Yield the unequal steps of a period-one gait, and the cycles that differ from the sum of their steps."""
+    """Yield steps of a period-one gait that are not equal, and cycles that differ from the sum of their steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
     if are_disjoint(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"
@@ -245,7 +253,7 @@ def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
 
 
 def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
-    """Yield a step length and speeds that do not follow from the length and angles of the legs."""
+    """Yield the step length and the speeds that disagree with the length and the angles of the legs."""
     leg = TABLE_1[0]
     for column, source in (("matlab", "x_p and Table 1"), ("adams", "Tables 1 and 2")):
         angles = [getattr(row, column) for row in TABLE_2[:2]]
@@ -259,7 +267,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
             )
         speed = getattr(V_COM, column)
         cycle = getattr(T_CYCLE, column)
-        # one step per cycle, as in section 5, or both steps of the cycle
+        # The speed may be that of one step per cycle, as in section 5, or of both steps of the cycle.
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
         if are_disjoint((low, high), speed.rounding):
             one_step = length / cycle.value
@@ -269,7 +277,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
 
 
 def start_error() -> tuple[Printed, str]:
-    """Return the largest error, which cannot be smaller than the difference between the two starts."""
+    """Return the largest error, which is printed as smaller than the difference between the two starts."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (
         f"the two starts of Table 2 alone differ by {angle:.4f} rad and {rate:.2f} rad/s, "

@@ -1,4 +1,4 @@
-"""The paper's numbers in order, with verdicts, and its three tables next to our measurements."""
+"""The numbers of the paper with our verdicts, in the order of the paper, and its three tables next to our values."""
 
 import math
 from collections import Counter
@@ -27,11 +27,11 @@ VERDICTS = (
 )
 """Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
-"""Model whose scene must equal the paper's for a mismatch to count; "any" if the paper's values alone decide."""
+"""Model whose scene must equal that of the paper for a mismatch to count, or "any" if the printed values decide."""
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
-    """Count values by verdict. `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
+    """Count values by verdict. Until 0.3 is released, `refuted` repeats the sum of the last two."""
     verdicts = Counter(row.verdict for row in rows)
     return {
         **{verdict.value: verdicts[verdict] for verdict in VERDICTS},
@@ -40,7 +40,7 @@ def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
 
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
-    """Yield all rows in the paper's order."""
+    """Yield the rows of all numbers, in the order of the paper."""
     judge = Judge(measured, study)
     contact = measured.contact
     walker = measured.walker
@@ -69,7 +69,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges the paper's numbers by measurements on a config's scene and on the paper's own."""
+    """Judges the numbers of the paper by measurements on the scene of a config, and on the scene of the paper."""
 
     measured: Measured
     study: PaperStudy
@@ -83,9 +83,11 @@ class Judge:
         scene: Scene,
         evidence: str,
     ) -> Judged:
-        """Build the row of a printed value. `rigid` holds the rigid model's values by set of equations.
+        """Build the row of a printed value.
 
-        verdict  verdict on the paper's own scene; replaced if another value of the paper contradicts the printed one
+        rigid    values of the rigid model, by set of equations
+        contact  value of the contact model, or None if it has no such value
+        verdict  verdict that holds unless other values of the paper contradict this one, or the scene is another
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
@@ -130,7 +132,7 @@ class Judge:
         return self.row(printed.LOST_BALANCE, {}, float(steps), verdict, "contact", text)
 
     def percent(self, row: printed.StartRow, coordinate: int) -> Judged:
-        """Judge a percentage of Table 2, which is arithmetic and so independent of the config."""
+        """Judge a percentage of Table 2. This is only arithmetic, so the config does not matter."""
         entry = row.percent
         verdict = verdict_on(entry, [row.percent_of_matlab], Verdict.EXPLAINED)
         left_open = None if entry in contradictions() else percent_left_open(row)
@@ -138,7 +140,7 @@ class Judge:
         return self.row(entry, {}, self.measured.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> Judged:
-        """Judge a coordinate of the ADAMS start, which is an input if the contact model starts from it."""
+        """Judge a coordinate of the ADAMS start. It is an input if the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
         verdict = Verdict.INPUT if entry.fits(value) else Verdict.NOT_REPRODUCED
@@ -146,7 +148,7 @@ class Judge:
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> Judged:
-        """Judge the five gait cycles, which the rigid model walks as well."""
+        """Judge the five gait cycles. They are an input, because the rigid model walks as many."""
         entry = printed.CYCLES_WALKED
         contact = self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
@@ -182,7 +184,7 @@ class Judge:
         return self.row(entry, lengths, contact, verdict_on(entry, lengths.values()), "rigid", text)
 
     def velocity_difference(self) -> Judged:
-        """Judge the difference of the average velocities. The evidence includes the paper's own arithmetic."""
+        """Judge the difference of the average velocities. The evidence repeats the arithmetic of the paper."""
         entry = printed.VELOCITY_DIFFERENCE
         percentages = self.measured.speed_differences
         left = printed.T_LEFT
@@ -195,17 +197,17 @@ class Judge:
         return self.row(entry, percentages, None, verdict, "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[Judged]:
-        """Judge a row of Table 3: MATLAB's value by the rigid model, ADAMS's value by the contact model."""
+        """Judge a row of Table 3: the MATLAB value by the rigid model, the ADAMS value by the contact model."""
         measured = self.measured
         study = self.study
         values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in values.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
-        # both step periods share one cause, so the evidence shows both
+        # Both step periods are wrong for the same reason, so the evidence shows both.
         names = ("t_left", "t_right") if row in (printed.T_LEFT, printed.T_RIGHT) else (row.name,)
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
-        # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
+        # With the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value.
         otherwise = Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
         verdict = verdict_on(row.matlab, rigid.values(), otherwise)
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
@@ -215,12 +217,12 @@ class Judge:
 
 
 def verdict_on(entry: Printed, values: Iterable[float | None], otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
-    """Return the verdict on a printed value, which counts as reproduced if any of some values has all of its digits."""
+    """Return the verdict on a printed value. It is reproduced if one of `values` agrees with all of its digits."""
     return Verdict.REPRODUCED if any(map(entry.fits, values)) else otherwise
 
 
 Table = dict[str, dict[str, Any]]
-"""Rows by name, each with its values by column; None if a model has no such value."""
+"""Rows by name, each with values by column. A value is None if the model has no such value."""
 
 MIDDLE = "section 2: 'in the middle of the legs'"
 
@@ -248,7 +250,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """Return the initial values, and their differences in percent of the MATLAB and of the ADAMS value."""
+    """Return the initial values, and how much MATLAB and ADAMS differ, in percent of either."""
     table = {}
     start = measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):
@@ -272,7 +274,10 @@ def table_3(measured: Measured) -> Table:
 
 
 def number_columns(row: printed.PrintedRow, rigid: Mapping[str, float | None], contact: float | None) -> dict[str, Any]:
-    """Return the columns: both printed numbers, the rigid model's for each set of equations, the contact model's."""
+    """Return the columns of a row: both printed numbers, then the values of the rigid and the contact model.
+
+    rigid  values of the rigid model, by set of equations
+    """
     return {
         "unit": row.matlab.unit,
         "paper_matlab": row.matlab.value,

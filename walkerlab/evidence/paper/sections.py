@@ -1,4 +1,4 @@
-"""Report sections on the paper: its values compared with ours, its tables and its errata."""
+"""Report sections on the paper: its numbers next to ours, its tables and its errata."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,9 +16,9 @@ from walkerlab.views.report.words import describe_error, words
 Row = Mapping[str, Any]
 
 TEXT_SUFFIX = "_text"
-"""Suffix of keys whose values are numbers in their printed form."""
+"""Suffix of the keys whose values are numbers as printed, which are texts."""
 MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
-"""Headers of the columns that are compared with the paper's numbers, by key."""
+"""Headers of the columns with which the numbers of the paper are compared, by key."""
 
 
 def numbers(results: page.Results) -> page.Section | None:
@@ -33,7 +33,7 @@ def numbers(results: page.Results) -> page.Section | None:
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
-    """Build the table of the paper's numbers by location, with columns for the models that have values."""
+    """Build the table of the numbers of the paper by location, with a column for each model that has values."""
     models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
@@ -47,7 +47,7 @@ def numbers_table(rows: Sequence[Row]) -> Table:
 
 
 def finding(rows: Sequence[Row]) -> str:
-    """State how many of the paper's values have each verdict."""
+    """Write a sentence on how many numbers of the paper have each verdict."""
     counts = Counter(row["verdict"] for row in rows)
     return words("paper.finding", {name: counts[name] for name in TONES})
 
@@ -65,7 +65,10 @@ def name_with_unit(name: str, unit: str | None) -> str:
 
 
 def compared(results: page.Results, key: str) -> Sequence[Row]:
-    """Return rows of the summary of `compare`, or no rows if it did not run or the walker is not the paper's."""
+    """Return the rows at `key` in the summary of `compare`.
+
+    There are none if the stage did not run, or if the walker is not that of the paper.
+    """
     rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
@@ -77,7 +80,7 @@ def tables(results: page.Results) -> page.Section | None:
 
 
 def table_of(key: str, rows: Any) -> Table:
-    """Build the table for a key of the summary of `compare`: one of the paper's tables, or all its numbers."""
+    """Build the table for a key of the summary of `compare`: a table of the paper, or all numbers of the paper."""
     captions = words.terms("paper.tables")
     if key not in captions:
         return numbers_table(rows)
@@ -85,7 +88,7 @@ def table_of(key: str, rows: Any) -> Table:
 
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
-    """Build a table in the paper's own digits, with symbols and units as row names and without empty columns."""
+    """Build a table of the paper with the digits as printed. Columns without values are omitted."""
     has_quantities = any("quantity" in row for row in rows.values())
     columns = [Column("symbol" if has_quantities else "quantity", "row")]
     heads = words.terms("paper.heads")
@@ -117,7 +120,7 @@ def errors(results: page.Results) -> page.Section | None:
 
 
 def paper_section(results: page.Results) -> page.Section | None:
-    """Summarise the verdicts on the paper's values and its most serious errors, or return None for any other scene."""
+    """Summarise the verdicts on the paper and its most serious errors, or return None for any other scene."""
     rows = results.claims
     if not rows:
         return None
@@ -125,7 +128,7 @@ def paper_section(results: page.Results) -> page.Section | None:
 
 
 def list_verdicts(results: page.Results, rows: Sequence[Row]) -> Iterator[page.PageBlock]:
-    """Yield the paper's values by verdict and location, and its most serious errors."""
+    """Yield the numbers of the paper by verdict and location, then its most serious errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield page.Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
@@ -174,7 +177,7 @@ def describe_recorded(stored: Row) -> str:
 
 
 def recorded_tables(stored: Row) -> Iterator[Table]:
-    """Yield the quantities of Table 3 with the recorded walk as a column, and its differences from both models."""
+    """Yield tables of the recorded walk: the quantities of Table 3 next to both models, then the differences."""
     models = {"rigid": "rigid model", "contact": "contact model", "recorded": str(stored["name"])}
     columns = [Column("quantity", "row"), *(Column(head, key, number, numeric=True) for key, head in models.items())]
     names = words.terms("paper.quantities")
@@ -198,7 +201,7 @@ def recorded_tables(stored: Row) -> Iterator[Table]:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Report the verdicts on the paper's values or, for another walker, the differences between the models."""
+    """Report the verdicts on the numbers of the paper or, for another walker, the differences between the models."""
     errors = summary.get("numerical_error", {})
     error_lines: list[str | Table] = [
         f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()

@@ -1,6 +1,6 @@
-"""Measurements on the paper's own walker and slope, and the errata that they support. They do not depend on the config.
+"""Measurements on the walker and the slope of the paper, and the errata that they support. No config affects them.
 
-Some measurements follow Appendix A's misprints. Their heel strike solves the six equations of (A.57) as printed.
+Some measurements keep the misprints of Appendix A. Their heel strike solves the six equations of (A.57) as printed.
 """
 
 import math
@@ -20,12 +20,12 @@ from walkerlab.physics.hybrid.comparison import Array
 from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk
 from walkerlab.physics.solvers.system import State
 
-RIGHT, MISPRINTED = 1.0, -1.0  # sign of the second row of P and E
+RIGHT, MISPRINTED = 1.0, -1.0  # sign of the second row of P (A.55) and of its derivative E (A.56)
 ROOT_TOLERANCE = 1e-9
 
 
 def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Array:
-    """Mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
+    """Return the mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
     c = swing_constants(walker)
     coupling = -c.mLb * math.cos(theta_2 - theta_1)
     s1 = math.sin(theta_1)
@@ -43,20 +43,23 @@ def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Ar
 
 
 def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
-    """Position P (m) of the swing foot, (A.55), with the stance foot at the origin. `row_2` is RIGHT or MISPRINTED."""
+    """Return the position P (m) of the swing foot by (A.55), with the stance foot at the origin.
+
+    row_2  sign of the second row: RIGHT or MISPRINTED
+    """
     L = walker.leg_length
     rise = L * (math.cos(theta_2) - math.cos(theta_1))
     return np.array([L * (math.sin(theta_1) - math.sin(theta_2)), row_2 * rise])
 
 
 def height_over_slope(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> float:
-    """Height (m) above the slope at which P places the swing foot."""
+    """Return the height (m) above the slope at which P places the swing foot."""
     along, up = swing_foot(walker, theta_1, theta_2, row_2)
     return float(along * math.sin(walker.slope) + up * math.cos(walker.slope))
 
 
 def swing_foot_gradient(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
-    """Matrix E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
+    """Return the matrix E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
     L = walker.leg_length
     return np.array(
         [
@@ -67,7 +70,7 @@ def swing_foot_gradient(walker: RigidWalker, theta_1: float, theta_2: float, row
 
 
 def velocities_after_impact(walker: RigidWalker, before: State, row_2: float) -> Array:
-    """Solve (A.57): velocities of (theta_1, theta_2, x, y) after the impact, before the change of roles."""
+    """Solve (A.57) for the velocities of (theta_1, theta_2, x, y) after the impact. The legs keep their numbers."""
     D = inertia_at_impact(walker, before[0], before[1])
     E = swing_foot_gradient(walker, before[0], before[1], row_2)
     system = np.block([[D, -E.T], [E, np.zeros((2, 2))]])
@@ -76,7 +79,7 @@ def velocities_after_impact(walker: RigidWalker, before: State, row_2: float) ->
 
 
 def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float) -> float:
-    """Speed (m/s) of the new stance foot after the impact, which (7) requires to be zero."""
+    """Return the speed (m/s) of the new stance foot after the impact, which should be zero by (7)."""
     after = velocities_after_impact(walker, before, row_2)
     return float(np.linalg.norm(swing_foot_gradient(walker, before[0], before[1], RIGHT) @ after))
 
@@ -92,8 +95,9 @@ def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
 
 
 def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None:
-    """Find the fixed point, near `guess`, of the step map with the impact of (A.57), or return None if the search
-    fails.
+    """Find the fixed point near `guess` of the step map with the impact of (A.57).
+
+    Return None if the search fails.
     """
 
     def state(z: Array) -> State:
@@ -107,34 +111,34 @@ def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None
     return state(solution.x) if np.abs(mismatch(solution.x)).max() < 1e3 * ROOT_TOLERANCE else None
 
 
-X_P_SETTLING_STEPS = 150  # steps from x_p to the fixed point; disturbances shrink by a factor of 0.6 per step
+X_P_SETTLING_STEPS = 150  # steps from x_p to the fixed point: each step multiplies a disturbance by 0.6
 FOOT_VELOCITY = (0.3, -0.2)  # m/s, velocity of the foot in the check of (A.9) to (A.24)
 
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """Measurements, in SI units."""
+    """Measurements on the scene of the paper, in SI units."""
 
     slope: float
     slope_rounding: float
-    # gaits to which walks from x_p converge, with the equations as printed and corrected
+    # measurements on the gaits to which walks from x_p converge, with the equations as printed and corrected
     as_printed: measured.RigidMeasurements
     corrected: measured.RigidMeasurements
     # Table 3 for five gait cycles from the printed x_p, with the equations as printed
     from_x_p: measured.Characteristics
     five_steps_energy: float  # J, time mean of the energy over the first five of the ten steps of `from_x_p`
     fastest: float  # rad/s, largest angular velocity of the gait as printed
-    largest_jump: float  # rad/s, largest change of an angular velocity at its heel strike
+    largest_jump: float  # rad/s, largest change of an angular velocity at the heel strike of this gait
     swing_foot_height: float  # m, height above the slope at which (A.55) as printed places the swing foot of x_p
     foothold_speed: float  # m/s, speed of the new stance foot if the printed gait's impact uses (A.55) as printed
     both_misprints: State | None  # fixed point near x_p with the misprints of (A.5) and (A.55), or None
-    # J, kinetic energy of one state: from the velocities of the masses, and from D_e with either order of coordinates
+    # J, kinetic energy of one state, from the masses and from D_e with either order of coordinates
     kinetic_energy: Mapping[str, float]
     adams: AdamsStart
 
 
 def study_the_paper() -> PaperStudy:
-    """Make all measurements on the paper's own walker and slope, which takes milliseconds once compiled."""
+    """Make all measurements on the walker and slope of the paper. This takes milliseconds once compiled."""
     wrong = printed.walker_of_the_paper(AS_PRINTED)
     right = printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
@@ -164,7 +168,10 @@ def study_the_paper() -> PaperStudy:
 
 
 def settle(walker: RigidWalker) -> State:
-    """Return the stable gait on which walks from x_p settle."""
+    """Return the stable gait on which walks from x_p settle.
+
+    Raises ArithmeticError if the walk ends early.
+    """
     walk = take_walk(assembled(walker), measured.TIGHT, printed.fixed_point_as_printed(), X_P_SETTLING_STEPS)
     if walk.steps < X_P_SETTLING_STEPS:
         raise ArithmeticError(f"x_p does not walk: {walk.outcome.label} after {walk.steps} steps")
@@ -172,7 +179,10 @@ def settle(walker: RigidWalker) -> State:
 
 
 def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
-    """Return the kinetic energy (J) at x_p with a moving foot: from masses, and from D_e with angles or foot first."""
+    """Return the kinetic energy (J) at x_p with a moving foot, computed in three ways.
+
+    `masses` adds up the point masses. The others use D_e, with the angles or the foot as first coordinates.
+    """
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
     D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])
@@ -196,7 +206,7 @@ def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Erratum:
-    """Error in the paper."""
+    """An error in the paper."""
 
     where: Annotated[str, Label("", "location in the paper")]
     printed: Annotated[str, Label("", "printed")]
@@ -206,7 +216,7 @@ class Erratum:
 
 
 def errata(study: PaperStudy) -> tuple[Erratum, ...]:
-    """Return all errata, by theme and then in the order of the paper's sections."""
+    """Return all errata: by theme, and within a theme in the order of the paper."""
     texts = [text.partition(": ")[2] for text in prose.parts("errata.errata", study)]
     length = len(fields(Erratum))
     return tuple(Erratum(*texts[first : first + length]) for first in range(0, len(texts), length))

@@ -1,4 +1,4 @@
-"""Stage `tune`: repeat the paper's adjustment for any walker, and report whether it is needed, its size and causes."""
+"""Stage `tune`: repeat the paper's adjustment for any walker, and report whether and why it is needed, and its size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -79,7 +79,8 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
-SAMPLING_FACTOR = 4  # factor on contact-sim's sampling rate; keeps interpolation errors far below the model error
+# We sample this many times as often as contact-sim, so that interpolation errors stay far below the model error.
+SAMPLING_FACTOR = 4
 COMPASS_SERIES = STICTION_SERIES, STIFFNESS_SERIES, DAMPING_SERIES, NORMAL_SERIES
 GAIT_SERIES = STICTION_SERIES, NORMAL_SERIES
 COARSE_STRIDE = 3  # use every third setting for walkers that are slower to simulate than the compass
@@ -115,7 +116,7 @@ WALK_LABELS = {
 
 @dataclass(frozen=True)
 class LimitFindings:
-    """Gaits (and walks) of each series, compared with those of the rigid model, and the limit without creep."""
+    """Distances of the gaits and walks of each series from those of the rigid model, and the limit without creep."""
 
     walk_series: tuple[str, ...]  # series in which whole walks are compared as well as gaits
     rigid_period: float  # s, period of the rigid gait
@@ -125,8 +126,9 @@ class LimitFindings:
 
 
 def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Progress) -> LimitFindings | None:
-    """Take the contact to the rigid limit, or return None if there is no contact gait, or if the rigid walk has no
-    samples or no step.
+    """Follow each series of contact settings towards the rigid limit.
+
+    Return None if there is no contact gait, or if the rigid walk has no samples or no step.
 
     rigid_gait  summary of `fixedpoint`
     """
@@ -146,7 +148,7 @@ def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Pro
     interval = scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME)
     stride = 1 if compass else COARSE_STRIDE
     limit = Limit(scene.ground, period, length, motion, walk.steps, interval, stride)
-    # Only the compass has point feet in one model and round feet in the other.
+    # Only the compass has point feet in the rigid model and round feet in the contact model.
     compared = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_SERIES if compass else GAIT_SERIES
     progress.start("tune: rigid limit", len(compared) + len(gaits))
@@ -157,7 +159,7 @@ def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Pro
     series: dict[str, list[Distance]] = {}
     for name in compared:
         walker = scene.walker
-        if name != ALL_SERIES:  # point feet, as in the rigid model
+        if name != ALL_SERIES:  # the series with point feet, as in the rigid model
             points = config.walker.model_copy(update={"foot_radius_m": 0.0})
             rules = knee_rules(config.walker)
             laws = walker.normal, walker.friction
@@ -172,7 +174,7 @@ def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Pro
 
 
 def limit_summary(findings: LimitFindings) -> dict[str, Any]:
-    """Summarise convergence orders, settings that reach the paper's 1e-4 rad, and causes of the period difference."""
+    """Summarise the orders of convergence, the settings that reach the paper's 1e-4 rad, and why the periods differ."""
     reaches = {}
     for name in findings.walk_series:
         distances = [distance for distance in findings.series[name] if distance.angle is not None]
@@ -197,9 +199,9 @@ def setting(distance: Distance) -> dict[str, Any]:
 
 
 def causes(findings: LimitFindings) -> dict[str, Any]:
-    """Return the difference in period (s) by cause, found by switching off one property at a time.
+    """Split the difference of the periods (s) by cause, by switching off one property at a time.
 
-    The rest is the joint effect of these properties; it includes creep if the limit without creep was not reached.
+    The rest is the joint effect of these properties. It includes creep if the limit without creep was not reached.
     """
     total = findings.contact_period - findings.rigid_period
     farthest = findings.series[findings.walk_series[-1]]
@@ -220,13 +222,15 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """Build one group per series: each setting, and how its gait and (if compared) walk differ from the rigid ones."""
+    """Build a group for each series: its settings, and how far the gait and, if compared, the walk are from rigid."""
     groups = {}
     for name, rows in findings.series.items():
         complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]
         if rows:
             of = [distance.setting for distance in complete or rows]
-            settings = rows_group(of, FACTOR_LABELS, SETTING, "number of the setting; the config's contact is first")
+            settings = rows_group(
+                of, FACTOR_LABELS, SETTING, "number of the setting, beginning with the config's contact"
+            )
             distances = columns(complete or rows, DISTANCE_LABELS | (WALK_LABELS if complete else {}), SETTING)
             path = f"limit/{name.replace(', ', '-').replace(' ', '-')}"
             groups[path] = Group({**settings.variables, **distances})
@@ -235,7 +239,7 @@ def limit_groups(findings: LimitFindings) -> dict[str, Group]:
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 UNCHANGED_START = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
-# walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser
+# Walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser.
 COMPASS_CELLS = 61
 OTHER_CELLS = 21
 COARSE_MARGINS = {"step": 0.05, "largest": 2.0}
@@ -245,12 +249,12 @@ WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengt
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start until the contact model walks, which fails if no start leads to walking.
+    """Adjust the start until the contact model walks. If no start leads to walking, the summary gives the reason.
 
     Raises NoAnswer if the pads need a gait that does not exist.
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
-    rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
+    rigid_gait = inputs["fixedpoint"].summary  # the start may be far from this gait
     gait = contact.contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
     scene = replace(contact.scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     tune = TuneRun(config, scene, rigid_state, gait)
@@ -265,15 +269,15 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
 
 
 class TuneRun:
-    """State and results of the stage.
+    """Inputs and results of the stage.
 
     names       names of the rigid start's coordinates
     steps       number of steps per walk
-    pins_foot   whether the first stance foot is pinned in one walk, as in the paper's procedure for its compass
+    pins_foot   whether one walk has its first stance foot pinned, as in the paper's procedure for its compass
     walks       walks of the procedure: `hinged`, with the first stance foot pinned; `released`, with both feet free;
                 and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks
-    adjustment  smallest change of the velocities with which the contact model walks; None if it never walks
+    adjustment  smallest change of the velocities with which the contact model walks, or None if it never walks
     """
 
     def __init__(self, config: TuneConfig, scene: contact.ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
@@ -294,7 +298,7 @@ class TuneRun:
         self.paper: AdamsWalk | None = None  # walk from the paper's ADAMS start, only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
-        """Run the procedure: its walks, the map, the adjusted start, its margins, and a walk from the paper's start."""
+        """Run the procedure: walks, map, adjusted start and margins. For the paper's compass, also try its start."""
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.pins_foot else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
@@ -322,8 +326,9 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Return the smallest change of the velocities with which the contact model walks, or None if it
-        never walks.
+        """Return the smallest change of the velocities with which the contact model walks, or None if it never does.
+
+        quick  the starts as simulated for the map
         """
         cells = self.contact_map
         if self.as_it_stands.walks:
@@ -335,9 +340,10 @@ class TuneRun:
 
     @property
     def gait_factors(self) -> tuple[float, float] | None:
-        """Position of the gait on the map, from the end of the adjusted walk, or None if it cannot be determined.
+        """Position of the gait on the map, or None if it cannot be determined.
 
-        The factors are velocities of the last step, once the rear foot has lifted, divided by those of the rigid start.
+        The factors are the velocities just after the rear foot lifts in the last step of the adjusted walk, divided by
+        those of the rigid start.
         """
         walk = self.walks.get("adjusted")
         n = len(self.rigid_state) // 2
@@ -355,13 +361,16 @@ class TuneRun:
         return float(rates[swing] / first[0]), float(rates[landed] / first[1])
 
     def walk(self, state: State, pinned: bool = False, tolerances: Tolerances | None = None) -> ContactWalkResult:
-        """Simulate the contact model from a rigid state as contact-sim does, by default at the config's tolerances."""
+        """Simulate the contact model from a state of the rigid model, by default at the tolerances of the config."""
         scene = replace(self.scene, pinned=pinned)
         interval = scene.ground.frame.pendulum_time / contact.SAMPLES_PER_PENDULUM_TIME
         return scene.walk(contact.start_state(scene, state), self.steps, tolerances or self.tolerances, interval)
 
     def take(self, name: str, state: State) -> None:
-        """Take and record a walk of the procedure, with its numerical error unless the solver failed."""
+        """Simulate and record a walk of the procedure, with its numerical error unless the solver failed.
+
+        name  its key in `walks`
+        """
         walk = self.walks[name] = self.walk(state, name == "hinged")
         report = self.printed[name] = walk_summary(walk)
         if walk.outcome.answered:
@@ -415,7 +424,7 @@ def summarise_adams_start(paper: AdamsWalk) -> dict[str, Any]:
 
 
 def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
-    """Tabulate the start before and after adjustment, its change and, for the paper's compass, the printed values."""
+    """Tabulate the start before and after the adjustment and, for the paper's compass, the printed values."""
     rows = {}
     adjusted = tune.adjusted_state
     for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
@@ -440,7 +449,7 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
 
 
 def percent(value: float, reference: float, base: float) -> float | None:
-    """Return the increase in magnitude over `reference`, in percent of `base`, or None for a base of zero."""
+    """Return how much `value` exceeds `reference` in magnitude, in percent of `base`, or None for a base of zero."""
     return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
@@ -472,7 +481,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
 
 
 def section_coordinates(scene: contact.ContactScene) -> list[tuple[str, str]]:
-    """Return descriptions and units of a gait's coordinates on its section."""
+    """Return a description and the unit of each coordinate of a gait on its section."""
     walker = scene.walker
     names = [body.name for body in scene.assembly.bodies]
 
@@ -491,7 +500,7 @@ def section_coordinates(scene: contact.ContactScene) -> list[tuple[str, str]]:
 
 
 def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
-    """Summarise the adjustment: whether it is needed, the smallest change that works, and the margins around it."""
+    """Summarise the adjustment: whether it is needed, the smallest change that suffices, and its margins."""
     change = tune.adjustment
     report: dict[str, Any] = {"needed": not tune.as_it_stands.walks, "found": change is not None}
     if change is None:
@@ -552,7 +561,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
 
 
 def map_group(tune: TuneRun) -> Group:
-    """Return the outcome and steps of both models over the two velocity factors."""
+    """Build the group with the outcome and steps of both models over the two velocity factors."""
     cells = tune.contact_map
     rigid = tune.rigid_map
     swing = "swing_factor"

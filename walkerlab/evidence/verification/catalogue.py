@@ -1,7 +1,7 @@
-"""Catalogues of extreme cases: one for the paper's compass, and one of variations of any scene.
+"""Catalogues of extreme cases: one for the paper's compass, and one of variations that apply to any scene.
 
-The variations change the ground, the slope, the start, the knees or the solver's settings. A walker's twin is a
-dynamically similar walker with another size, mass and gravity, which walks in the same way.
+The variations change the ground, the slope, the start, the knees or the settings of the solver. The twin of a walker
+has another size, mass and gravity, but is dynamically similar, so it must walk in the same way.
 """
 
 import math
@@ -28,7 +28,7 @@ SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
 PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
     fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected")
 )
-"""Physically possible outcomes. A case whose outcome is unknown accepts all of them, so only its measures can fail."""
+"""Physically possible outcomes. A case whose outcome we cannot know accepts all. Then only its measures can fail."""
 STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
 SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
 CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
@@ -49,9 +49,9 @@ def read_catalogue(path: Path) -> Any:
 
 
 def all_cases(user_cases: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Return a catalogue's cases (default: the package's), then a config's.
+    """Return the cases of a catalogue (by default that of the package), then those of a config.
 
-    Raises ConfigError if two share a name.
+    Raises ConfigError if two cases share a name.
     """
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in user_cases}
@@ -63,17 +63,19 @@ def all_cases(user_cases: Sequence[Case], catalogue: Sequence[Case] | None = Non
 def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
     """Return the cases as a tuple.
 
-    Raises ConfigError if two share a name.
+    Raises ConfigError if two of them share a name.
     """
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
-        raise ConfigError(f"Case names must differ; used more than once: {', '.join(doubled)}.", UNIQUE_NAME_ADVICE)
+        raise ConfigError(
+            f"Case names must differ, but these are used more than once: {', '.join(doubled)}.", UNIQUE_NAME_ADVICE
+        )
     return tuple(cases)
 
 
 def config_of(case: Case) -> Config:
-    """Apply a case's changes to the paper's config.
+    """Apply the changes of a case to the paper config.
 
     Raises ConfigError if the result is invalid.
     """
@@ -81,7 +83,7 @@ def config_of(case: Case) -> Config:
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """Return a scene's cases with their configs: for the rigid model and, if the scene has contact, the contact model.
+    """Return the cases of a scene with their configs, for the rigid model and, if the scene has contact, for both.
 
     config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """
@@ -110,7 +112,7 @@ def features(config: Config) -> set[str]:
 
 
 def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
-    """Apply a case's changes to a scene. A new slope also turns the start's angles, so that both feet stand on it."""
+    """Apply the changes of a case to a scene. A new slope also turns the start, so that both feet stand on it."""
     start = changes.get("start", 1.0)
     slope = changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
@@ -128,7 +130,7 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
 
 
 B = TypeVar("B", bound=Block)
-# leg (m), mass (kg) and gravity (m/s^2) of the twin: uneven values, so that its rounding errors differ
+# leg (m), mass (kg) and gravity (m/s^2) of the twin, with uneven values so that rounding errors differ
 TWIN_LEG = 1.37
 TWIN_MASS = 11.3
 TWIN_GRAVITY = 7.43
@@ -140,14 +142,14 @@ def pendulum_time(config: RigidConfig) -> float:
 
 
 def to_twin(config: RigidConfig) -> Units:
-    """Return the scale factors from a config's walker to its twin of ordinary size."""
+    """Return the scale factors that turn a config's walker into its twin."""
     length = TWIN_LEG / config.walker.leg_length_m
     mass = TWIN_MASS / config.walker.total_mass_kg
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
 def scaled_block(block: B, by: Units) -> B:
-    """Scale each value of a block according to the unit of its key."""
+    """Return the block with each value scaled according to the unit of its key."""
 
     def value(quantity: Any, unit: float) -> Any:
         if isinstance(quantity, Block):

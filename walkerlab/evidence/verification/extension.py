@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 def cases_config(config: reads.SceneConfig) -> type:
-    """Return the type of config that `stability` takes. A study's walker needs less than a scene."""
+    """Return the type of config that `stability` takes: less for the walker of a study than for any other scene."""
     return reads.CompassCasesConfig if is_studied(config) else reads.SceneCasesConfig
 
 
 def paper_walks(_config: object) -> dict[str, Any]:
     """Return the part of the paper's config that the cases depend on."""
-    # imported here, because the command line's help does not need it
+    # Imported here, because the help of the command line would otherwise load it.
     from walkerlab.config.loader import paper_config_with
 
     return {"paper": reads.slice_of(paper_config_with({}), reads.WalksConfig)}
 
 
 def known_problems_and_start(config: reads.SceneConfig) -> tuple[str, ...]:
-    """Require stage `known-problems` and, for a walker outside the studies, the stages of `gait_for_start_or_pads`."""
+    """Return the required stages: `known-problems` and, outside the studies, those of `gait_for_start_or_pads`."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 

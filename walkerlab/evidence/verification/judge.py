@@ -1,11 +1,11 @@
 """Judgement of cases, and ordinary methods on the same cases.
 
-Each walk is repeated with a ten times tighter tolerance, another method and a scaled twin.
+Each walk is repeated with a ten times tighter tolerance, with another method and for a scaled twin of the walker.
 
-The ordinary methods are SciPy at its default tolerances, and a game engine's method with fixed steps. To them, a
-contact scene is one differential equation without events, like that of a user unaware of switching points and pad
-edges. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison.
-A rigid scene is run by a user's script with an event function.
+The ordinary methods are those of SciPy at default tolerances, and that of game engines with fixed steps. They treat a
+contact scene as one differential equation without events, as would a user who does not know of switching points and
+pad edges. They integrate it to the end of our walk, which is recomputed at a tight tolerance for the comparison.
+A rigid scene is simulated by a user's script with an event function.
 """
 
 import time
@@ -54,7 +54,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.run.workers import map_in_order
 
 MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
-FINE_ERROR: Final = 1e-2  # largest error of a fine result, in leg lengths, rad and pendulum times
+FINE_ERROR: Final = 1e-2  # largest error of a result that counts as fine, in leg lengths, rad and pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # default rtol and atol of solve_ivp
 DIVERGED_ERROR: Final = 10.0  # error above which a result has diverged, in the same units
 COMPARED_STEPS: Final = 2
@@ -72,18 +72,18 @@ class Choice:
     case: str
     method: str
     verdict: str  # fine, wrong silently, gives up, diverges
-    error: float | None  # error of the final state; None if the method gave up or diverged
+    error: float | None  # error of the final state, or None if the method gave up or diverged
     rhs_evaluations: int
     wall_s: float
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Simulate a case by every ordinary method.
+    """Simulate a case with every ordinary method.
 
-    The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
-    ground that needs events (a pinned foot, or `after-mid-swing`).
+    Return () for a walker other than a passive compass, for a case without a start or without motion, and for ground
+    that needs events (a pinned foot, or `after-mid-swing`).
     """
-    # knees need an event to lock, and the script for rigid scenes covers only the walker of Appendix A
+    # The lock of a knee is an event, and the script for rigid scenes covers only the walker of Appendix A.
     if not is_passive_compass(config):
         return ()
     short = case.model_copy(
@@ -110,15 +110,19 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True)
 class Arrival:
-    """End of a case's walk, the reference for other methods."""
+    """End of the walk of a case, with which other methods are compared."""
 
     case: str
     time_s: float
     state: Floats
-    units: Floats  # unit of each component of the state
+    units: Floats  # unit in which the error of each component of the state is measured
 
     def judge_end(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """Judge a method by its end state y (None if it was not reached) and the `count` of right-hand sides."""
+        """Judge a method by its end state.
+
+        y      end state, or None if the method did not reach it
+        count  right-hand sides that the method evaluated
+        """
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
@@ -141,7 +145,7 @@ def natural_units(config: RigidConfig) -> Floats:
 
 @contextmanager
 def suppress_warnings() -> Iterator[None]:
-    """Suppress the libraries' warnings, and the exceptions with which they give up."""
+    """Suppress the warnings of libraries, and the exceptions with which they give up."""
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
@@ -179,13 +183,13 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 
 def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
-    """Simulate a contact scene by semi-implicit Euler with at most `cap` steps of h (s)."""
+    """Simulate a contact scene by semi-implicit Euler, with at most `cap` steps of size h (s)."""
     system = OnPads(place_on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
     steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
-    # Rounding may leave the sum of just enough steps a little before the end.
+    # The sum of exactly enough steps may end a little early due to rounding, which must not count as giving up.
     late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
     return arrival.judge_end(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)
 
@@ -193,13 +197,13 @@ def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINA
 TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # walks of more steps are not sampled
 LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
-"""Libraries' methods, tried if our own fail; the multistep method comes first, because ours are one-step methods."""
-LIBRARY_BUDGET: Final = 30_000  # right-hand sides; small, because the libraries' solvers run in Python
+"""Methods of libraries, tried if ours fail. The multistep method comes first, because ours are one-step methods."""
+LIBRARY_BUDGET: Final = 30_000  # right-hand sides, few because the solvers of libraries run in Python
 
 
 @dataclass(frozen=True)
 class Second:
-    """Walk of a case by a second method."""
+    """Walk of a case with a second method."""
 
     method: str  # empty if no method reached an answer
     walk: JudgedWalk | None
@@ -208,10 +212,10 @@ class Second:
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to judge and to simulate by ordinary methods, possibly in another process."""
+    """A case to judge and to simulate with ordinary methods. This may happen in another process."""
 
     case: Case
-    config: Config | None = None  # config of a scene's variation; None if the case changes the paper config
+    config: Config | None = None  # config of a variation of a scene, or None if the case changes the paper config
 
     def run(self) -> tuple[CaseResult | Choice, ...]:
         """Return the judgement, then the results of the ordinary methods."""
@@ -220,8 +224,9 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile. The others start in
-    order of decreasing budget.
+    """Yield the results in the order of the cases.
+
+    One case per model runs first, so that only one process compiles. The others start in order of decreasing budget.
     """
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
@@ -256,7 +261,7 @@ def judge(case: Case, config: Config) -> CaseResult:
         for what, again in repeat_walks(start, config, short, second):
             findings += time_difference(what, walk, again, case, methods.rtol)
             differs = again.outcome is not walk.outcome and again.outcome.label not in case.expected
-            # A walk that was shortened may end in another way for that reason alone.
+            # A shortened walk may end differently just because it is shorter.
             if differs and short.steps == case.steps:
                 remarks.append(f"{what}: {again.outcome.label}, not {walk.outcome.label}")
     if isinstance(start, ContactStart):
@@ -269,7 +274,7 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
-    """Return the walks that must agree with the first, as pairs (description, walk)."""
+    """Repeat a walk in ways that must lead to the same times, and return pairs (description, walk)."""
     tighter = start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR))
     again = [("the walk with ten times tighter tolerance", tighter)]
     if second.walk is not None:
@@ -284,8 +289,9 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """Compare the touch times of two walks, or their end times if one has no touch, or return an empty list if an end
-    time is missing.
+    """Compare the touch times of two walks, or the end times if one of them has no touch.
+
+    Return an empty list if an end time is needed and missing.
     """
     steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
@@ -305,8 +311,10 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Simulate a walk with other methods until one has an answer. `budget` limits right-hand sides (libraries may get
-    fewer).
+    """Simulate a walk with other methods until one of them has an answer.
+
+    budget  limit on right-hand sides, which may be lower for libraries
+    walk    function that simulates the walk with a method and a budget
     """
     tried: list[str] = []
     for method in other_methods(configured):

@@ -1,6 +1,4 @@
-"""Stage `known-problems`: problems with known answers, solved with the contact code. They do not depend on
-the scene.
-"""
+"""Stage `known-problems`: solve problems with known answers with the contact code. The scene does not matter."""
 
 import math
 import time
@@ -30,7 +28,7 @@ from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.store.content import Content, rows_group
 
-# pad length, so that no edge is in reach; its negative serves as leg length, so that no hip is low enough for a fall
+# Pads of this length have no edge in reach. Its negative serves as leg length, so that no hip is low enough for a fall.
 UNBOUNDED_M = 1e7
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, position of an inactive foot
 PROBLEM_BUDGET = 2_000_000  # right-hand sides
@@ -60,9 +58,11 @@ def rig(
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
 ) -> ContactWalker:
-    """Build a walker that acts as one rigid body. `feet` holds its point feet (m from its centre of mass).
+    """Build a walker that acts as one rigid body.
 
-    The idle second body is hinged at the centre of mass and has the same inertia but no mass.
+    It needs a second body, which has the same inertia but no mass, and idles at a hinge in the centre of mass.
+
+    feet  positions of the point feet relative to the centre of mass (m)
     """
     assembly = Assembly(
         bodies=(Body("body", mass, CENTRE, inertia), Body("idle", 0.0, CENTRE, inertia)),
@@ -103,7 +103,7 @@ def run_until(
 
 @dataclass(frozen=True)
 class Known:
-    """Quantity computed with the contact code, and its reference value."""
+    """A quantity computed with the contact code, and the reference value."""
 
     name: Annotated[str, Label("", "name of the problem")]
     quantity: Annotated[str, Label("", "compared quantity, with its unit")]
@@ -132,13 +132,16 @@ def solve_problem(
     limit: float,
     why: str,
 ) -> Known:
-    """Solve a problem with the contact code (`run`) and by its reference. A failed run never meets the limit."""
+    """Solve a problem with the contact code (`run`) and compute the reference. A failed run never meets the limit.
+
+    why  reason for the limit
+    """
     started = time.perf_counter()
     reference = reference_by()
     try:
         value = run()
     except ArithmeticError:
-        # Far beyond any limit, but finite, because a result holds no infinity.
+        # This is far beyond any limit, but finite, because results must not contain infinity.
         value = math.copysign(1e300, reference)
     return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
 
@@ -156,15 +159,15 @@ def bouncing_ball_period() -> float:
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / EARTH_GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, EARTH_GRAVITY)
-    # The run ends in flight, from where the last landing follows exactly.
+    # In flight the time of the next landing follows exactly, so the run ends there.
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
-    in_flight = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY  # until the next landing
-    return (float(run.times[-1] + in_flight) - first) / BOUNCES
+    until_landing = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY
+    return (float(run.times[-1] + until_landing) - first) / BOUNCES
 
 
 def restitution(law: Impact, speed: float) -> float:
-    """Return the coefficient of restitution of a ball as heavy as the walker that lands at `speed` (m/s)."""
+    """Return the coefficient of restitution of a ball that is as heavy as the walker and lands at `speed` (m/s)."""
     ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
     start = rig_state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * EARTH_GRAVITY * height)))
@@ -180,7 +183,7 @@ def block_speed(slope: float, start_speed: float) -> float:
     """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
     law = PAPER_LAW
     foot = law.resting_foot(BLOCK_MASS * EARTH_GRAVITY * math.cos(slope), BLOCK_MASS)
-    # It starts at the depth at which it rests, so that it neither falls nor bounces.
+    # The block starts at the depth at which it would rest, so that it neither falls nor bounces.
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
     return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
@@ -194,9 +197,9 @@ ROUNDS = 14
 
 
 def rimless_wheel_speed() -> float:
-    """Return the angular speed (rad/s) of a steadily rolling wheel when a spoke is normal to the slope.
+    """Return the angular speed (rad/s) of a steadily rolling wheel at the moment when a spoke is normal to the slope.
 
-    A run models two spokes and turns the wheel from one to the other; the next run starts with its final speed.
+    A run has only two spokes and turns the wheel from one to the other. The next run starts with the final speed.
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
@@ -218,9 +221,9 @@ ROD_STIFFNESS = 1.0e8
 
 
 def painleve_growth_rate() -> float:
-    """Compute the rate s (1/s) at which the end of a sliding rod digs in, from penetrations d at equal time intervals.
+    """Compute the growth rate s (1/s) with which the end of a sliding rod digs in, from penetrations d.
 
-    For d = a + b cosh(s t), the differences D of d over a time tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
+    For d = a + b cosh(s t), its differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
     ground = Impact(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4)
@@ -288,7 +291,7 @@ PROBLEMS: Final = (
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Solve every problem. Wrong answers are stored like right ones, because the stage `stability` reports them."""
+    """Solve every problem. Wrong answers are stored as well, because the stage `stability` reports them."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         result = problem()

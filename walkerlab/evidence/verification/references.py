@@ -1,4 +1,4 @@
-"""References for the known problems, without the contact code: closed forms, and SciPy on separately coded laws."""
+"""References for the known problems that do not use the contact code: closed forms, or SciPy on laws coded again."""
 
 import math
 from typing import Any
@@ -7,8 +7,10 @@ from typing import Any
 def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: float) -> float:
     """Return the time (s) between landings of a ball on an undamped linear spring, in closed form.
 
-    Flight takes 2 v / g. Contact obeys x'' = g - w^2 x from x = 0, x' = v and takes half a period plus twice the phase
-    shift due to gravity.
+    Flight takes 2 v / g. Contact obeys x'' = g - w^2 x from x = 0, x' = v. It takes half a period of the spring plus
+    twice the phase shift due to gravity.
+
+    drop  height from which the ball falls (m)
     """
     speed = math.sqrt(2.0 * gravity * drop)
     omega = math.sqrt(stiffness / mass)
@@ -33,7 +35,7 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
         return y[1], gravity - impact_force(y[0], y[1], law) / mass
 
     def leave(t: float, y: Any) -> float:
-        # The ball is also at the surface as it lands.
+        # The ball is at the surface also when it lands, which must not end the integration.
         return float(y[0]) if t > 0.0 else 1.0
 
     leave.terminal, leave.direction = True, -1.0  # type: ignore[attr-defined]
@@ -83,12 +85,12 @@ def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: floa
 
 
 def painleve_growth_rate(angle: float, friction: float, mass: float, stiffness: float) -> float:
-    """Return the rate (1/s) at which a sliding rod's end digs into a linear spring, beyond the critical friction.
+    """Return the growth rate (1/s) with which the end of a sliding rod digs into a linear spring.
 
     angle  between rod and ground (rad)
 
     A normal force N with friction mu N accelerates the end by A N, m A = 1 + 3 cos(angle) (cos(angle) - mu sin(angle)).
-    For negative A the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
+    Above the critical friction A is negative: the force drives the end in, and penetration grows as exp(sqrt(-A k) t).
 
     Source: Painleve (1895); Champneys, Varkonyi, The Painleve paradox in contact mechanics (2016).
     """

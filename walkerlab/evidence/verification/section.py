@@ -46,7 +46,7 @@ def section(results: page.Results, summary: Row) -> page.Section | None:
 
 
 def finding(summary: Row) -> str:
-    """State how many cases ended as expected, and how many of those were expected to end without an answer."""
+    """State how many cases ended as expected, and how many of these were meant to end without an answer."""
     return words("stability.finding", summary, len([row for row in summary["cases"] if row["ok"] and gave_up(row)]))
 
 
@@ -56,7 +56,7 @@ def gave_up(row: Row) -> bool:
 
 
 def ending(row: Row) -> Cell:
-    """Return the table cell of a case's outcome, green only for an expected answer."""
+    """Return the table cell with the outcome of a case. It is green only if an answer was expected and found."""
     return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
 
@@ -122,5 +122,5 @@ def ordinary_cell(row: Row | None) -> Cell:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Report how many cases ended as expected, and which did not."""
+    """Report how many cases ended as expected, and which of them did not."""
     return [finding(summary), family_table(summary["cases"]), *failures(summary)]

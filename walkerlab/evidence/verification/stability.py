@@ -1,4 +1,4 @@
-"""Stage `stability`: extreme cases and known problems, judged by measures independent of the walk's computation."""
+"""Stage `stability`: extreme cases and known problems, judged by measures independent of how walks are computed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -25,7 +25,7 @@ def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tup
     return (
         omission(
             "the named extreme cases",
-            "they are cases of the paper's compass; this walker has its own cases",
+            "they are cases of the paper's compass, and this walker has other ones",
             "about a hundred cases",
         ),
         omission("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
@@ -35,9 +35,9 @@ def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tup
 def run(
     config: CompassCasesConfig | SceneCasesConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1
 ) -> Content:
-    """Judge the catalogue and the config's own cases, try ordinary methods, and report the known problems.
+    """Judge the cases of the catalogue and of the config, try ordinary methods, and report the known problems.
 
-    For a walker other than the paper's compass the catalogue consists of variations of the scene.
+    For a walker other than the paper's compass, the catalogue consists of variations of the scene.
 
     Raises ConfigError if two cases share a name.
     """
@@ -90,7 +90,7 @@ def summarise(
         "known": list(problems),
         "passed": total - len(failed),
         "failed": len(failed),
-        # an ordinary method that did not reach the end has no error
+        # An ordinary method that did not reach the end has no error, and the key must be absent then.
         "ordinary": [{name: value for name, value in asdict(row).items() if value is not None} for row in ordinary],
         "ordinary_cap": MAX_ORDINARY_EVALUATIONS,
         "ordinary_fine": FINE_ERROR,

@@ -1,4 +1,4 @@
-"""Stage `stability-maps`: maps over stiffness, stiction velocity and step size, resumed after an interruption."""
+"""Stage `stability-maps`: maps over stiffness, stiction velocity and step size. Interrupted runs resume."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -25,12 +25,12 @@ from walkerlab.pipeline.store.files import Checkpoint
 PAPER_STIFFNESS: Final = Contact().to_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
-ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which hold only finite numbers
-PER_STICTION: Final = 10.0  # friction velocity / stiction velocity, as in the paper
+ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which can store only finite numbers
+PER_STICTION: Final = 10.0  # ratio of friction velocity to stiction velocity, as in the paper
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-# right-hand sides per cell: for the walk, for its second walk at tighter tolerances, and for the reference, which
-# mostly needs about 7e6
+# right-hand sides per cell: for the walk, for the walk at tighter tolerances, and for the reference, which usually
+# needs about 7e6
 CELL_BUDGET = 600_000
 TIGHTER_CELL_BUDGET = 1_200_000
 REFERENCE_CELL_BUDGET = 20_000_000
@@ -57,10 +57,10 @@ def prepare_on_ground(
 
 
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
-    """Simulate a walk with the default method at one stiffness and stiction velocity.
+    """Simulate a walk with the default method at one stiffness (N/m^e) and stiction velocity (m/s).
 
-    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks (in
-    leg lengths, rad, pendulum times; `ERROR_MISSING` if outcome or step count differ), and the right-hand sides.
+    Returns outcome, step count, outcome at a ten times tighter tolerance, difference of both walks (in leg lengths, rad
+    and pendulum times, or `ERROR_MISSING` if outcome or step count differ), and number of right-hand sides.
     """
     case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
     walk = again = start.walk(case, case_tolerances(start, case))
@@ -76,8 +76,9 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Simulate two steps at one stiffness by semi-implicit Euler with each step size (s), and compare them with a
-    reference at a tight tolerance.
+    """Simulate two steps of the walker by semi-implicit Euler, at one stiffness (N/m^e) with each step size (s).
+
+    The result is compared with a reference at a tight tolerance.
 
     Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error, in the units of `stiction_cell`.
     """
@@ -119,7 +120,7 @@ def run(
 ) -> Content:
     """Compute the missing cells of both maps.
 
-    checkpoint  cells of earlier runs; new cells are added to it
+    checkpoint  cells of earlier runs, to which new cells are added
     jobs        number of processes
     """
     cells = config.stability.map_cells

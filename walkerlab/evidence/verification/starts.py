@@ -1,8 +1,8 @@
 """Starts of cases: a walker in its initial state, its walk in either model, and checks of conservation laws.
 
-The momentum balance compares a walk's change of momentum with the impulse of ground and gravity. Momenta are computed
-from positions and velocities of the masses, not from the equations of motion. Impulses are integrated from forces at
-sampled states; sampling is refined until the integrals settle, because an impact lasts only milliseconds.
+The momentum balance compares the change of momentum during a walk with the impulse of ground and gravity. Momenta are
+computed from positions and velocities of the masses, not from the equations of motion. Impulses are integrated from
+forces at sampled states. An impact lasts only milliseconds, so sampling is refined until the integrals settle.
 """
 
 from collections.abc import Sequence
@@ -38,11 +38,11 @@ from walkerlab.scene.rigid import first_step_length, rigid_walker
 
 
 class Masses:
-    """Point masses of a walker, with levers from a reference point (default: its centre of mass).
+    """Point masses of a walker, with levers from a reference point. By default this is the centre of mass.
 
     mass     (masses,) kg
     levers   (masses, bodies, 2) m, from the reference point to each mass
-    inertia  (bodies,) kg m^2, of each body about its own centre of mass
+    inertia  (bodies,) kg m^2, inertia of each body about its centre of mass
     """
 
     def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
@@ -55,8 +55,9 @@ class Masses:
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
-        """Return positions and velocities (..., masses, 2) from the reference point. `psi` and `rate` are (...,
-        bodies).
+        """Return positions (m) and velocities (m/s) of the masses from the reference point (..., masses, 2).
+
+        psi, rate  angles (rad) and rates (rad/s) of the bodies (..., bodies)
         """
         arms = rotate(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
@@ -64,7 +65,7 @@ class Masses:
 
 
 def rotate(d: Floats, psi: Floats) -> Floats:
-    """Rotate levers (..., bodies, 2) by the angles of their bodies (..., bodies)."""
+    """Rotate levers `d` (..., bodies, 2) by the angles `psi` of their bodies (..., bodies)."""
     s, c = np.sin(psi), np.cos(psi)
     return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
 
@@ -76,7 +77,7 @@ class Moving:
     mass: Floats  # (masses,) kg
     place: Floats  # (masses, 2) m
     velocity: Floats  # (masses, 2) m/s
-    inertia: Floats  # (bodies,) kg m^2, about the bodies' own centres of mass
+    inertia: Floats  # (bodies,) kg m^2, about the centre of mass of each body
     rate: Floats  # (bodies,) rad/s
     hip: Floats  # (2,) m
     contact: Floats  # (2,) m, lowest point of the swing foot
@@ -87,8 +88,9 @@ class Moving:
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
     def momentum_about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
-        """Return the angular momentum (kg m^2/s) about a point. `on_masses` and `on_bodies` are the weights of their
-        terms.
+        """Return the angular momentum (kg m^2/s) of part of the walker about a point (2,).
+
+        on_masses, on_bodies  fractions of each mass and of each inertia that belong to this part
         """
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
@@ -99,7 +101,7 @@ class SwingMasses:
     """Momenta and energy of a walker in the rigid model while its first leg swings, computed from its point masses."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
-        """Measure levers from the centre of the stance foot's arc. The slope is in rad."""
+        """Measure all levers from the centre of the stance foot's arc. The slope is in rad."""
         foot = assembly.feet[STANCE]
         trailing = assembly.feet[SWING]
         hip = find_hip(assembly)
@@ -130,9 +132,7 @@ class SwingMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def share_of(self, leg: int) -> Floats:
-        """Return the fraction (bodies,) of each body that belongs to a leg, which for coupled bodies is between 0 and
-        1.
-        """
+        """Return the fraction of each body that belongs to a leg (bodies,). Only coupled bodies belong in part."""
         names = [body.name for body in self.assembly.bodies]
         of_leg = self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])
@@ -145,9 +145,9 @@ class SwingMasses:
         """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
         The first is that of the walker about the new foothold. The second is that of the lifting leg about the hip,
-        including its share of coupled bodies.
+        including the share of the leg in coupled bodies.
 
-        new  whether the pose is after heel strike, with the roles of the legs exchanged
+        new  whether `moving` is the motion after the heel strike, when the legs have exchanged roles
         """
         share = self.shares[SWING if new else STANCE]
         foothold = np.zeros(2) if new else moving.contact
@@ -156,7 +156,7 @@ class SwingMasses:
 
 
 class RigidMasses:
-    """Heel strikes of a walk, computed from the point masses of both legs, which swing alternately."""
+    """Heel strikes of a walk, computed from point masses. The legs swing alternately, and may differ."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
@@ -164,7 +164,10 @@ class RigidMasses:
         self.turns = (own, own if have_equal_legs(assembly) else SwingMasses(exchanged, slope))
 
     def poses(self, states: Floats, first: int = 0) -> list[Moving]:
-        """Return the masses in each of the states (strikes, 2 n). In the first state leg `first` (0 or 1) swings."""
+        """Return the motion of the masses in each of the states (strikes, 2 n).
+
+        first  leg that swings in the first state, 0 or 1
+        """
         return [self.turns[(first + k) % 2].pose(state) for k, state in enumerate(states)]
 
     def momentum_change(
@@ -180,8 +183,8 @@ class RigidMasses:
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             at_start = np.array(self.turns[k % 2].momenta(old, new=False))
             at_end = np.array(self.turns[(k + 1) % 2].momenta(new, new=True))
-            # The impulse acts along the trailing leg, so it has no moment about the hip and does not enter the second
-            # balance.
+            # The push-off acts along the trailing leg. So it has no moment about the hip, and the second momentum does
+            # not change.
             at_start[0] += moment_of(push_offs[(k + 1) % 2], old)
             change = max(change, *np.abs(at_end - at_start))
             size = max(size, *np.abs(at_start), *np.abs(at_end))
@@ -189,12 +192,15 @@ class RigidMasses:
 
 
 def moment_of(push_off: float, moving: Moving) -> float:
-    """Return the angular impulse (kg m^2/s) of a push-off (N s, from rear foot to hip) about the new foothold."""
+    """Return the moment (kg m^2/s) of a push-off about the new foothold.
+
+    push_off  impulse (N s), from the rear foot to the hip
+    """
     along, up = push_off * moving.hip / np.hypot(*moving.hip)
     return float(moving.contact[1] * along - moving.contact[0] * up)
 
 
-def energy_won(before: Sequence[Moving], after: Sequence[Moving]) -> float:
+def energy_gain(before: Sequence[Moving], after: Sequence[Moving]) -> float:
     """Return the largest gain of kinetic energy (J) in a heel strike, or 0 if all of them lose energy."""
     return max(0.0, *(new.kinetic - old.kinetic for old, new in zip(before, after, strict=True)))
 
@@ -207,11 +213,12 @@ def feet_off_the_slope(before: Sequence[Moving]) -> float:
 MEASURE: Final = "momentum change not explained by ground and gravity, relative to the walker's momentum"
 BALANCE_STEPS: Final = 2  # enough for an impact and the motion after it
 INITIAL_INTERVALS: Final = 256
-MAX_PASSES: Final = 9  # refinements; each splits unsettled intervals into four
-MAX_INTERVALS: Final = 30_000  # finer grids are not refined further
-# largest total error of the impulse, as a fraction of the walker's momentum; each interval gets an equal part of it
+MAX_PASSES: Final = 9  # limit on refinements, each of which splits unsettled intervals into four
+MAX_INTERVALS: Final = 30_000  # a grid with more intervals is not refined further
+# Largest total error of the impulse, as a fraction of the walker's momentum. Each interval may have an equal part.
 SETTLED_IMPULSE_SHARE: Final = 1e-6
-MAX_UNKNOWN: Final = 1e-3  # fraction of the walker's momentum; a balance with more unknown impulse is inconclusive
+# A balance in which more of the impulse is unknown is inconclusive (fraction of the walker's momentum).
+MAX_UNKNOWN: Final = 1e-3
 
 
 @dataclass(frozen=True)
@@ -219,8 +226,8 @@ class Balance:
     """Result of a momentum balance, in fractions of the walker's momentum."""
 
     residual: float  # largest difference between momentum change and impulse, over time and components
-    unsure: float  # estimated error of the integrated impulse
-    unresolved: float  # error of the friction's impulse, since slip velocities are known only to the tolerance
+    unsure: float  # estimated error of the integration of the impulse
+    unresolved: float  # error of the impulse of friction, because slip velocities are known only to the tolerance
     steps: int  # solver steps
 
 
@@ -237,14 +244,14 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
-    # Step errors add up without growing, because the balance holds along the computed path, so MAGNIFIED does not
-    # apply.
+    # The balance holds along the computed path, also where this departs from the exact one. So errors of steps add up
+    # without growing, and MAGNIFIED does not apply.
     limit = allowed_difference(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(balance.residual), limit)
 
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
-    """Compare the change of momentum with the impulse over the first steps of a case."""
+    """Compare the change of momentum with the impulse over the first `BALANCE_STEPS` steps of a case."""
     mass = config.walker.total_mass_kg
     leg = config.walker.leg_length_m
     rates = np.abs(start[len(start) // 2 :])
@@ -256,7 +263,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
     if scene.walker.whole.push_off != 0.0:
-        # A short pulse must not lie between two points of the grid.
+        # A short pulse could lie between two points of the grid and be missed.
         pulse = scene.walker.whole.push_off_duration * np.linspace(0.0, 1.0, 9)
         pushed = (walk.touch_time_s[:, None] + pulse).ravel()
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
@@ -264,16 +271,17 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         samples = scene.walk(start, steps, tolerances, add_midpoints(grid)).samples
         assert samples is not None, "the walk is sampled"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
-        change = unsettled(samples.time_s, rates)
-        wanting = change > SETTLED_IMPULSE_SHARE / grid.size
-        if not wanting.any() or grid.size > MAX_INTERVALS:
+        change = integration_errors(samples.time_s, rates)
+        unsettled = change > SETTLED_IMPULSE_SHARE / grid.size
+        if not unsettled.any() or grid.size > MAX_INTERVALS:
             break
-        grid = split(samples.time_s, wanting)
+        grid = split(samples.time_s, unsettled)
     assert samples is not None, "the walk is sampled"
     momenta = momentum(samples, config) / scale
     differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
     accepted = int(walk.work[ACCEPTED])
-    # between solver steps the slip velocity is known only to the tolerance; its error has a random sign in each step
+    # The slip velocity is known only to the tolerance. Its errors have random signs, so their effects add up like a
+    # random walk, hence the square root.
     slip = tolerances.atol + tolerances.rtol * speed
     push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
     return Balance(float(differences.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
@@ -287,7 +295,7 @@ def add_midpoints(grid: Floats) -> Floats:
 def split(times: Floats, coarse: NDArray[np.bool_]) -> Floats:
     """Return the ends of intervals after splitting those marked in `coarse` into four.
 
-    `times` holds ends and midpoints.
+    times  ends and midpoints of the intervals, in ascending order
     """
     first = times[:-1:2]
     middle = times[1::2]
@@ -297,25 +305,30 @@ def split(times: Floats, coarse: NDArray[np.bool_]) -> Floats:
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Integrate a rate (times, components) by Simpson's rule up to the end of each interval. Returns (ends,
-    components).
+    """Integrate a rate (times, components) by Simpson's rule from the start to each end of an interval.
+
+    Returns (ends, components).
+
+    times  ends and midpoints of the intervals, in ascending order
     """
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
 
 
-def unsettled(times: Floats, rate: Floats) -> Floats:
-    """Estimate each interval's integration error, in its worst component: Simpson's rule minus the midpoint rule."""
+def integration_errors(times: Floats, rate: Floats) -> Floats:
+    """Estimate the error of each interval by Simpson's rule minus the midpoint rule, in the worst component."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))
 
 
 def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
-    """Return (times, 3): force along and normal to the slope (N), and torque about a point of the slope (N m).
+    """Return the external force along and normal to the slope (N) and its torque about a point of the slope (N m).
 
-    Ground, gravity and push-offs contribute; push-offs start at the touch times, `touches` (steps,) in s.
+    Ground, gravity and push-offs contribute. The result has the shape (times, 3).
+
+    touches  (steps,) touch times (s), at which push-offs start
     """
     along, height, normal, friction, _ = np.moveaxis(sample_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
@@ -343,7 +356,10 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
-    """Return (ends, 3): momentum along and normal to the slope (kg m/s), and about a point of the slope (kg m^2/s)."""
+    """Return the momentum along and normal to the slope (kg m/s) and about a point of the slope (kg m^2/s).
+
+    It has the shape (ends, 3): the midpoints of the intervals are left out.
+    """
     y = samples.states[::2]
     n = y.shape[1] // 2 - 2
     walker_masses = Masses(assembly_of(config.walker))
@@ -359,16 +375,18 @@ def cross(r: Floats, v: Floats) -> Floats:
 
 
 CENTRE_HEIGHT = 1  # index of the height of the centre of mass in the free walker's state
-STRIKE_TOLERANCE = 1e-9  # largest relative error of the conditions at a heel strike
+STRIKE_TOLERANCE = 1e-9  # largest relative error at a heel strike
 SAMPLE_RATE = 40  # samples per pendulum time
-REGAIN_TOLERANCE = 1e-3  # fraction of the allowed residual by which quadrature errors may lower the dissipated energy
+# Errors of quadrature may lower the dissipated energy, but by no more than this fraction of the allowed residual.
+REGAIN_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class JudgedWalk:
-    """Walk to be judged, in either model. Times are in units of the walker's pendulum time.
+    """Walk to be judged, in either model. Times are in pendulum times of the walker.
 
-    end         end time; None in the rigid model, whose walks end at a heel strike
+    touches     times of the heel strikes
+    end         end time, or None in the rigid model, whose walks end at a heel strike
     residual_J  residual of the energy balance or, in the rigid model without springs, energy drift within a swing
     numbers     values that must be finite
     """
@@ -390,10 +408,10 @@ class CaseStart:
     residual_name: ClassVar[str]  # description of `JudgedWalk.residual_J`
     config: WalksConfig
     start: State
-    energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
+    energy: float  # J, m g L plus kinetic and elastic energy at the start, by which residuals are divided
 
     def repeated_case(self, case: Case) -> Case:
-        """Return the case for a repeated walk, with all its steps, because outcomes are also compared."""
+        """Return the case for a repeated walk. It keeps all its steps, because outcomes are compared, too."""
         return case
 
 
@@ -403,11 +421,11 @@ class RigidStart(CaseStart):
     walker: RigidModel
 
     def repeated_case(self, case: Case) -> Case:
-        """Return the case for a repeated walk, with only the steps whose times are compared."""
+        """Return the case for a repeated walk. It keeps only the steps whose times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
-        """Simulate a case. Only heel strikes are judged, so nothing is sampled."""
+        """Simulate a case. Only heel strikes are judged, so `sampled` has no effect."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches = walk.touch_time_s / pendulum_time(self.config)
@@ -417,7 +435,7 @@ class RigidStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
-        """Check heel strikes: the foot lands on the slope, momentum is conserved and energy does not grow."""
+        """Check that at heel strikes feet land on the slope, momentum is conserved and energy does not grow."""
         record: RigidWalkResult = walk.record
         if not record.steps:
             return []
@@ -428,7 +446,7 @@ class RigidStart(CaseStart):
         distance = feet_off_the_slope(before) / self.walker.leg_length
         momentum_change = strikes.momentum_change(before, after, pushes)
         # Push-offs may add energy.
-        gain = 0.0 if any(pushes) else energy_won(before, after) / self.energy
+        gain = 0.0 if any(pushes) else energy_gain(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
             "momentum changed by a heel strike": momentum_change,
@@ -454,8 +472,9 @@ class ContactStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
-        """Measure the energy that friction and damping seem to return, or return an empty list if the walk was not
-        sampled.
+        """Measure the energy that friction and damping seem to give back.
+
+        Return an empty list if the walk was not sampled.
         """
         record: ContactWalkResult = walk.record
         if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
@@ -483,12 +502,12 @@ def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerance
 
 @cache
 def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
-    """Find the gait of a walker. It is cached, because most cases of a catalogue differ only in the ground."""
+    """Find the gait of a walker. Most cases of a catalogue differ only in the ground, so it is cached."""
     return find_gaits(walker, seed).gait
 
 
 def prepare_start(config: WalksConfig, case: Case) -> Start | None:
-    """Prepare the start of a case, or return None if the start or the pad pitch needs a gait that does not exist."""
+    """Prepare the start of a case. Return None if the start or the pad pitch needs a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)

@@ -8,14 +8,14 @@ from walkerlab.config.analyses import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
-"""Name of the measure of cost. It is unrelated to correctness, so it never counts as the worst measure."""
+"""Name of the measure of cost. It says nothing about correctness, so it never counts as the worst measure."""
 
 MAGNIFIED: Final = 10.0  # factor by which a walk may magnify the errors of its steps
 
 
 @dataclass(frozen=True)
 class Measure:
-    """Dimensionless measure of a walk's correctness or cost, with its largest acceptable value."""
+    """A dimensionless measure of how correct or expensive a walk is."""
 
     measure: str
     value: float
@@ -47,14 +47,14 @@ class CaseResult:
     model: str
     reason: str
     expected: tuple[str, ...]
-    outcome: Annotated[str, Label("", "how it ended")]
+    outcome: Annotated[str, Label("", "how the case ended")]
     steps: Annotated[int, Label("1", "steps walked")] = 0
     energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")] = 0.0  # noqa: N815
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")] = 0
     wall_s: float = 0.0
     findings: tuple[Measure, ...] = ()  # measures taken
     remarks: tuple[str, ...] = ()  # descriptions of further faults
-    second_method: str = ""  # second method, for comparison; empty if no other method had an answer
+    second_method: str = ""  # method of the second walk, empty if no other method had an answer
     second_tried: str = ""  # failed methods with their outcomes, or the reason why none was tried
     not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be taken
 
@@ -65,7 +65,7 @@ class CaseResult:
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 
     @property
-    def ok(self) -> Annotated[bool, Label("1", "whether it ended as expected and passed every measure")]:
+    def ok(self) -> Annotated[bool, Label("1", "whether the case ended as expected and passed every measure")]:
         return not self.failures
 
 
@@ -77,9 +77,9 @@ def finite(value: float) -> float:
 def allowed_difference(case: Case, rtol: float, steps: int) -> float:
     """Return the largest expected difference between the times of two walks, in pendulum times.
 
-    rtol   the larger relative tolerance of the two walks
-    steps  number of solver steps in both walks together
+    The error of a step may reach rtol, because values are of order one.
 
-    The error of a step may reach rtol, since values are of order one.
+    rtol   relative tolerance of the less accurate walk
+    steps  number of solver steps in both walks together
     """
     return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -10,7 +10,7 @@ from walkerlab.exchange.planar import PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
 Forces = Callable[[float, Floats, Floats], Floats]
-"""Function of time (s), coordinates and velocities that returns generalised forces; the next call overwrites them."""
+"""Function of time (s), coordinates and velocities. It returns generalised forces, which the next call overwrites."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Integrator:
     order: int  # nominal order of convergence
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
-    # whether to run it only with the engine's contact, because without contact it equals another integrator
+    # whether to run it only with native contact, because without contact it equals another integrator
     for_contact_only: bool = False
 
 
@@ -33,7 +33,7 @@ class OwnContact:
 
 
 OnStep = Callable[[float, Floats, Floats], bool]
-"""Function called after every engine step with time (s), coordinates and velocities; returns whether to continue."""
+"""Function called after every engine step with time (s), coordinates and velocities. It returns whether to continue."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Stepping:
     """Integrator and step control of an engine's run."""
 
     integrator: str
-    step_s: float  # step size; the largest one if steps are adaptive
+    step_s: float  # step size, or the largest one if steps are adaptive
     tolerance: float | None = None  # None for fixed steps
 
 
@@ -57,10 +57,11 @@ class Simulation(ABC):
         forces: Forces | None = None,
         own: OwnContact | None = None,
     ) -> None:
-        """Build the model at velocities v and coordinates q (m, rad): root freedoms, then hinges.
+        """Build the model in its start state.
 
-        forces  external forces on the walker
-        own     the engine's own ground contact, if it is used
+        q, v    coordinates (m, rad) and velocities: first the freedoms of the base, then the hinges
+        forces  external forces on the walker, or None
+        own     native ground contact of the engine, or None
         """
         self.stepping = stepping
         self.forces = forces

@@ -2,8 +2,8 @@
 
 The walk takes place in Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so at
 rest under the weight m g the penetration x is m g / k and the damping m g d. SAP is linear: its damping is k times the
-relaxation time. With s the slip velocity over the stiction tolerance, friction rises as 10 s^3 - 15 s^4 + 6 s^5 in the
-continuous model and as s / sqrt(1 + s^2) in Lagged; SAP regularises it internally.
+relaxation time. Let s be the slip velocity divided by the stiction tolerance. Then friction rises as
+10 s^3 - 15 s^4 + 6 s^5 in the continuous model and as s / sqrt(1 + s^2) in Lagged. SAP regularises it internally.
 
 Source: Drake documentation, Multibody: contact modeling; Castro, Permenter, Han (2022).
 """
@@ -25,7 +25,7 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED_METHODS = ("runge_kutta3",)  # adapt their steps by default
+EMBEDDED_METHODS = ("runge_kutta3",)  # they adapt their steps unless told not to
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
@@ -44,7 +44,7 @@ def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     stiffness = target.mass * target.gravity / target.penetration
     omega = math.sqrt(target.gravity / target.penetration)
     load = target.creep_load / target.friction
-    # slip velocity / stiction tolerance at which friction is the fraction `load` of full friction
+    # ratio of slip velocity to stiction tolerance at which friction is the fraction `load` of full friction
     share = load / math.sqrt(1.0 - load * load)
     if model not in APPROXIMATIONS:
         share = brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15)
@@ -109,7 +109,7 @@ class DrakeRun(adapter.Simulation):
 
         if self._discrete:
             for count in range(1, min(steps, round(until_s / self._h)) + 1):
-                # Updates are due at multiples of the step. At a time between two of them, rounding cannot omit one.
+                # Updates are due at multiples of the step. Stop between two, so that rounding cannot skip one.
                 self._simulator.AdvanceTo((count + 0.25) * self._h)
                 if not on_step(count * self._h, *self._state()):
                     return
@@ -117,7 +117,7 @@ class DrakeRun(adapter.Simulation):
         remaining = [steps]
 
         def monitor(root: Any) -> Any:
-            # Drake also calls monitors when the simulator is initialised.
+            # Drake calls monitors also when the simulator is initialised, which is no step.
             if root.get_time() <= 0.0:
                 return EventStatus.DidNothing()
             remaining[0] -= 1
@@ -149,7 +149,7 @@ class DrakeRun(adapter.Simulation):
 
 
 def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Add bodies, joints and feet. Return the joints in coordinate order and the geometries of feet and floor."""
+    """Add bodies, joints and feet. Return joints in the order of coordinates, and geometries of feet and floor."""
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -181,9 +181,7 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world with its degrees of freedom, and return the
-    joints.
-    """
+    """Join a link to its parent by a hinge, or the base to the world with its freedoms, and return the joints."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 
@@ -197,7 +195,7 @@ def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body
         return [plant.AddJoint(RevoluteJoint(link.name, parent_frame, child_frame, axis))]
     if model.freedoms == ("along", "height", "turn"):
         return [plant.AddJoint(PlanarJoint(link.name, parent_frame, child_frame))]
-    # Each slide is a joint of its own, so a body without mass connects the two.
+    # Each of the two slides is a joint, and a body without mass must connect them.
     carriage = plant.AddRigidBody("carriage", SpatialInertia.Zero())
     x, y = np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0))
     along = plant.AddJoint(PrismaticJoint("along", parent_frame, carriage.body_frame(), x))
@@ -205,7 +203,7 @@ def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body
 
 
 def material(own: adapter.OwnContact) -> Any:
-    """Return the surface properties of feet and floor, each of which contributes half of the compliance."""
+    """Return the surface properties of feet and floor. Each surface contributes half of the compliance."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
@@ -218,15 +216,15 @@ def material(own: adapter.OwnContact) -> Any:
         friction=CoulombFriction(settings["friction"], settings["friction"]),
     )
     if "relaxation_time" in settings:
-        # the relaxation times of both surfaces add up
+        # The relaxation times of both surfaces add up, so each gets half.
         properties.AddProperty("material", "relaxation_time", 0.5 * settings["relaxation_time"])
     return properties
 
 
 def add_forces(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
-    """Add a system that computes the external forces from the plant's state at every evaluation.
+    """Add a system that computes the external forces from the state of the plant at every evaluation.
 
-    place  index of each coordinate in Drake's order
+    place  index of each of our coordinates in Drake's order
     """
     from pydrake.systems.framework import LeafSystem
 

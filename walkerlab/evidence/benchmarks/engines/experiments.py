@@ -1,7 +1,7 @@
 """Experiments in other engines, compared with our own solution: same law, own law, and a swing without contact.
 
-Under the same law, an engine integrates our contact forces; under its own law, it computes contact by its own model.
-An engine runs in a separate process, so that a crash or hang does not stop the stage.
+Under the same law, an engine integrates our contact forces. Under its own law, it computes contact by its native model.
+Engines run in separate processes, so that a crash or hang does not stop the stage.
 """
 
 import math
@@ -31,7 +31,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, derivative
 from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerTimeoutError
 
-START_UP_S = 60.0  # extra time for the first task, which loads the engine and compiles
+START_UP_S = 60.0  # extra time for the first task, in which the process loads the engine and compiles
 R = TypeVar("R")
 
 
@@ -46,7 +46,7 @@ class TaskLost:
 class OwnProcess:
     """Runs tasks one after another in a worker process, which is restarted after a crash or time-out.
 
-    The worker's output is suppressed and it has its own folder, since engines print and write logs.
+    Engines print and write log files, so the output is suppressed and the process has its own folder.
     """
 
     def __init__(self) -> None:
@@ -83,14 +83,14 @@ class OwnProcess:
             return TaskLost(traceback.format_exception_only(error)[0].strip()[:200])
 
     def abandon(self) -> None:
-        """Kill the running task and reject further ones. Another thread may call this."""
+        """Kill the running task and reject further ones. This may be called from another thread."""
         self._abandoned = True
         worker = self._worker
         if worker is not None:
             worker.process.kill()
 
     def _end(self) -> None:
-        """Kill the process, since an engine may hang."""
+        """Kill the process. An engine may hang, so it is not asked to stop."""
         if self._worker is not None:
             self._worker.process.kill()
             self._worker.close()
@@ -104,11 +104,11 @@ ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adap
 ERROR_GOAL = 1e-5  # stop refining once the error under our law is below this
 SETTLED_CHANGE = 1e-4  # stop refining once the period on an engine's own contact changes by less (relative)
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
-START_FACTORS = (0.95, 0.99)  # factors on the gait's velocities
+START_FACTORS = (0.95, 0.99)  # factors on the velocities of the gait, for walks from other starts
 TUNING_STEP_S = 2e-5
 COMPARED_TOUCHES = 2
 OWN_TOUCHES = 10
-INTO_NEXT_STEP = 0.9  # states are compared at this fraction of the step after the last compared touch
+INTO_NEXT_STEP = 0.9  # end states are compared at this fraction of the step after the last compared touch
 SWING_S = 0.48
 RUN_TIMEOUT_S = 120.0  # time limit of a run, after which its process is killed
 OUR_METHOD = "radau5"
@@ -117,13 +117,14 @@ ADAMS_RTOL = 1e-7  # relative tolerance of our walk for comparison with engines'
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
-STEP_ALLOWANCE = 2  # factor on the step budget on an engine's own contact, where a walk may last longer than ours
+# On its native contact an engine's walk may last longer than ours, so the step budget is multiplied by this.
+STEP_ALLOWANCE = 2
 OUR_REPEATS = 3
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Reference for a scene: our own walk at a tight tolerance, by two methods."""
+    """Reference for a scene: our walk at a tight tolerance, computed by two methods."""
 
     until_s: float
     end: Floats  # state at `until_s`
@@ -135,7 +136,7 @@ class Truth:
 def simulate(
     scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None
 ) -> ContactWalkResult:
-    """Simulate the scene with our own solver, sampling the state at `until_s` if it is not None."""
+    """Simulate the scene with our own solver. If `until_s` is given, sample the state at that time."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, UNLIMITED_BUDGET, track_energy=False)
     return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
@@ -156,27 +157,31 @@ def make_truth(scene: EngineScene) -> Truth | None:
 
 
 def sampled_end(result: ContactWalkResult) -> Floats | None:
-    """Return the state at a walk's second sample (the first is the start), or None if it was not reached."""
+    """Return the state at the second sample of a walk, or None if it was not reached. (The first one is the start.)"""
     samples = result.samples
     return None if samples is None or len(samples.states) < 2 else np.asarray(samples.states[1])
 
 
 @dataclass(frozen=True)
 class EngineExperiment:
-    """One engine, or this project, in one experiment on one scene."""
+    """An experiment on a scene with one engine, or with our solver."""
 
     scene: EngineScene
     engine: str
     version: str
     experiment: str
-    truth: Truth | None = None  # reference for the runs; None if they are not compared
+    truth: Truth | None = None  # reference for the runs, or None if they are not compared
 
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
-        """Evaluate a run, or record why it was lost. `start` is the initial velocities as a multiple of the gait's."""
-        # under our law, the errors are those of the end state and the touch times; on the engine's own contact, it is
-        # error of the last period; only completed walks that start from the gait have one
+        """Evaluate a run, or record why it was lost.
+
+        integrator  name of the integrator or contact model
+        start       factor on the initial velocities of the gait
+        """
+        # Under our law, the errors are those of the end state and of the touch times. On native contact, the error is
+        # that of the last period, and only a completed walk from the gait has one.
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s = stepping.step_s
         tolerance = stepping.tolerance
@@ -190,7 +195,7 @@ class EngineExperiment:
         if touches.size >= 2:
             period_s = float(np.diff(touches)[-1])
             length_m = float(np.diff(answer.along_m)[-1])
-            if answer.slips_m.size == touches.size:  # otherwise the last foot has not lifted
+            if answer.slips_m.size == touches.size:  # otherwise the foot of the last step has not lifted
                 slip_m = float(answer.slips_m[-1])
         if truth is not None and self.experiment == OWN_LAW:
             if period_s is not None and answer.outcome == Outcome.WALKED.label and start == 1.0:
@@ -209,8 +214,9 @@ class EngineExperiment:
 def our_walk(
     scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
 ) -> runs.WalkAnswer:
-    """Time our own walk over `touches` steps, or until `until_s` in the step after them. The time is the median of
-    `repeats`.
+    """Time our own walk over `touches` steps, or until `until_s` in the step after them.
+
+    The run time is the median over `repeats` walks.
     """
     walls = []
     for _ in range(repeats):
@@ -226,9 +232,9 @@ def our_walk(
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Yield our runs over a ladder of tolerances, then our walks for comparison with engines' own contact."""
+    """Yield our runs over a ladder of tolerances, then our walks for comparison with native contact of engines."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
-    # This walk compiles the kernels, so it is not timed.
+    # The first walk compiles the kernels, which must not be timed.
     our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
         answer = our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)
@@ -240,7 +246,10 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
-    """Return an integrator's step sizes, or its tolerances if it is adaptive, from coarse to fine."""
+    """Return the step sizes of an integrator or, if it is adaptive, its tolerances, from coarse to fine.
+
+    steps_s  step sizes (s) for fixed steps
+    """
     if integrator.adapts:
         return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in ADAPTIVE_TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
@@ -261,7 +270,7 @@ class EngineOnScene:
         """Simulate a walk of at most `max_steps` engine steps.
 
         label   name of the integrator or contact model in the row
-        native  the engine's native contact; None for our law
+        native  the engine's native contact, or None for our law
         start   factor on the gait's initial velocities
         """
         law, until_s = (SAME_LAW, self.truth.until_s) if native is None else (OWN_LAW, UNLIMITED_S)
@@ -286,7 +295,10 @@ class EngineOnScene:
                     break
 
     def tune(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
-        """Tune a contact model to the scene's contact and measure how close it comes."""
+        """Tune a contact model to the contact of the scene, and measure how close it comes.
+
+        contact  name of the contact model
+        """
         name = self.engine.name
         sliding = 1.5 * self.scene.ours.friction.sliding_from
         answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)
@@ -302,9 +314,11 @@ class EngineOnScene:
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
     def own_law(self, contact: str, native: OwnContact) -> Iterator[EngineRow]:
-        """Yield walks on the engine's native contact: from the gait with ever finer steps, then from other starts."""
-        # Walks from other starts use the second finest step. Adaptive walks from the gait share one step budget, and
-        # each is expected to take as many steps as the one before.
+        """Yield walks on the engine's native contact: from the gait with finer and finer steps, then from other starts.
+
+        Walks from other starts use the second finest step.
+        """
+        # Adaptive walks from the gait share one step budget. Each is expected to take as many steps as the one before.
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
         max_steps = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
@@ -316,7 +330,7 @@ class EngineOnScene:
             row, answer = self.walk(contact, stepping, max_steps, native)
             yield row
             completed.append(stepping)
-            # A run that came to the time limit counts as if it had used up its budget.
+            # A run that reached the time limit counts as if it had used its budget, because finer steps take longer.
             steps = answer.steps if not isinstance(answer, TaskLost) else max_steps if answer.timed_out else 0
             spent += steps
             if steps >= max_steps or (integrator.adapts and spent + steps > max_steps):
@@ -328,7 +342,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, max_steps, native, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """Simulate the passive swing of the pinned walker with each integrator. Return results and lost runs."""
+        """Simulate the passive swing of the pinned walker with each integrator, and return results and lost runs."""
         scene = self.scene
         engine = self.engine
         model = runs.pinned_model(self.scene)
@@ -362,7 +376,7 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """Return the swing's end state, by our equations and SciPy's DOP853, and the function energy(state) (J)."""
+    """Integrate the swing by our equations and SciPy's DOP853. Return end state and function energy(state) (J)."""
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
@@ -384,6 +398,6 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:
-    """Return the shortest run time (s) of the runs with at most this error, or None if there is no such run."""
+    """Return the shortest run time (s) of all runs whose error is at most `error`, or None if there is no such run."""
     good = [row for row in rows if row.error is not None and row.error <= error]
     return min((row.wall_s for row in good if row.wall_s is not None), default=None)

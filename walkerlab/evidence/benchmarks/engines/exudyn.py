@@ -1,6 +1,6 @@
-"""Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, a ball on a triangle as contact.
+"""Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, contact of balls with a triangle.
 
-The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d' with the k and e of ADAMS's law; friction
+The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d' with the k and e of ADAMS's law. Friction
 rises linearly with the slip velocity until it is full.
 
 Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
@@ -39,7 +39,7 @@ EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
 def tune(model: str, target: EngineContact) -> adapter.OwnContact:
-    """Compute the settings that meet the target, including the slip velocity at which friction is fully developed."""
+    """Compute the settings that meet the target, including the slip velocity at which friction is full."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
         "contact_stiffness": target.mass * target.gravity / target.penetration**target.exponent,
@@ -91,11 +91,11 @@ class ExudynRun(adapter.Simulation):
         stepping = settings.timeIntegration
         h = self.stepping.step_s
         stepping.endTime = min(until_s, steps * h) if not adaptive else until_s
-        # Rounding must not add a step.
+        # Without the small margin, rounding could add a step.
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
         stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods keep their step
-        # Contact is detected at the end of a step without iterations, as in any explicit method.
+        # No iterations: contact is detected at the end of a step, as in any explicit method.
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
         settings.solution.file.write = False
@@ -112,7 +112,7 @@ class ExudynRun(adapter.Simulation):
 
 
 def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
-    """Add the model's tree to the system. Return its object number and the joint index of each link."""
+    """Add the tree of the model to the system, and return its object number and the joint index of each link."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
 
@@ -127,7 +127,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
         for freedom in freedoms:
-            # Each freedom of the base needs a link of its own, of which only the last has a mass.
+            # Each freedom of the base needs a separate link. Only the last of these links may have the mass.
             last = freedom == freedoms[-1]
             hangs = link.parent >= 0
             offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)
@@ -162,7 +162,10 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
 def add_contacts(
     system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact
 ) -> Iterator[Any]:
-    """Add contact for each foot, between a ball and a large triangle. Yield the object numbers."""
+    """Add a contact between each foot and a large triangle, and yield its object number.
+
+    places  joint index of each link, as returned by `add_tree`
+    """
     import exudyn as exu
     from exudyn import itemInterface
 

@@ -1,7 +1,7 @@
-"""Walking rules applied to an engine's walk after each step: touches, lifts, pads, knees and outcome.
+"""Walking rules that are applied to an engine's walk after each engine step: touches, lifts, pads, knees and outcome.
 
-An engine yields states only at the ends of its steps. Within a step a foot's height is the cubic through its heights
-and velocities at both ends, so a touch is located to fourth order in the step.
+An engine gives states only at the ends of its steps. Within a step, the height of a foot is taken as the cubic through
+the heights and velocities at both ends, which locates a touch to fourth order in the step.
 """
 
 import math
@@ -27,17 +27,16 @@ from walkerlab.physics.solvers.scipy_methods import entry_point
 from walkerlab.physics.solvers.system import Floats
 
 Feet = tuple[FootMotion, FootMotion]
-# Enough for the rounding of a double.
-CROSSING_HALVINGS = 60
+CROSSING_HALVINGS = 60  # enough to locate a crossing to rounding
 DIVERGED_M = 1e4  # a run with a foot farther away than this has diverged
 
 
 @dataclass(frozen=True, order=True)
 class Turn:
-    """Lock or release of a knee within a step."""
+    """Lock or release of a knee within an engine step."""
 
-    share: float  # fraction of the step at which it occurs
-    event: int  # index of its event function
+    share: float  # fraction of the engine step at which it occurs
+    event: int  # index of the event function that detects it
 
 
 Bend = tuple[float, float]
@@ -49,7 +48,7 @@ class WalkerProbe:
 
     def __init__(self, scene: EngineScene, ground: Any, walk_state: WalkState) -> None:
         size = scene.model.size
-        # the system shares the walk state's progress array, which is therefore current at every call
+        # The system shares the progress of the walk state, so that each call sees the current one.
         self.system = place_on_ground(scene.walker, ground, progress=walk_state.progress)
         self._fixed = (self.system, scene.model.chain)
         self._motion = np.zeros((2, 4))
@@ -72,7 +71,7 @@ class WalkerProbe:
         return self._forces
 
     def bends(self, q: Floats, v: Floats) -> list[Bend]:
-        """Return the extension of each knee and its rate. Both are zero for a locked knee."""
+        """Return the extension and the rate of each knee. Both are zero for a locked knee."""
         return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self._knees]
 
 
@@ -81,15 +80,15 @@ class RuleFollower:
 
     scene       scene with the currently locked knees
     walk_state  state of the walk apart from its coordinates
-    outcome     outcome of the walk; None while it continues
-    turn        lock or release of a knee within the last step; such a step is discarded
-    watches     whether knees are monitored
+    outcome     outcome of the walk, or None while it continues
+    turn        lock or release of a knee within the last engine step, which is then discarded
+    watches     whether locks and releases of knees are searched for
     """
 
     def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
         """Start a walk of at most `steps` steps with both feet on the ground.
 
-        carries  whether our contact law acts; if not, the engine uses its own contact, and we apply only the drives
+        carries  whether our contact law acts. If not, the engine uses native contact, and we apply only drives
         """
         self.walk_state = new_walk_state(scene.ours, scene.ground, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
@@ -99,20 +98,20 @@ class RuleFollower:
         self.watches = True
         self._feet: Feet
         self._see(scene, q, v)
-        # both feet stand on the ground, but rounding may put them slightly above it
+        # Both feet stand on the ground. Rounding may put them slightly above it, which would count as a lift.
         first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
         self._feet = first, second
         self._edges = [edges_under(scene.ground.terrain, foot, self.walk_state.cells[foot]) for foot in range(2)]
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Follow a scene's model from q and v on."""
+        """Follow the model of a scene from coordinates q and velocities v on."""
         self.scene = scene
         self.probe = WalkerProbe(scene, self._ground, self.walk_state)
         self._feet = self.probe.feet(q, v)
         self._bends = self.probe.bends(q, v)
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
-        """Update the walk after an engine step. Return whether the ground under a foot may have changed."""
+        """Update the walk after an engine step, and return whether the ground under a foot may have changed."""
         before = self._feet
         now = self.probe.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
@@ -151,7 +150,7 @@ class RuleFollower:
                 continue
             walk_state.cells[foot], walk_state.has_ground[foot] = cell, has_ground_in_cell(cell)
             self._edges[foot] = edges_under(terrain, foot, cell)
-            # The foot has met the flank of a pad, below its top.
+            # The foot is below the top of the pad that it has reached, so it has hit the side of the pad.
             if walk_state.has_ground[foot] and now[foot].height < 0.0:
                 self._end(Outcome.OFF_PAD)
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
@@ -168,7 +167,7 @@ class RuleFollower:
             new = now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
-            # Engines have no states within a step, so the walker goes back with its velocities at the end of the step.
+            # Engines have no states within a step, so the walker moves back from the end at its velocities there.
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             time_at_event = self.time_s + share * h
             if above:
@@ -182,12 +181,15 @@ class RuleFollower:
     @property
     def is_outdated(self) -> bool:
         """Whether a touch has released a knee that the engine's model still has locked."""
-        # a leg without a knee counts as locked
+        # A leg without a knee counts as locked, so only the legs with knees are counted.
         knees = self.walk_state.knee[: len(self.scene.assembly.knees)]
         return int(np.count_nonzero(knees == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Lock or release the knee in `turn`, and return coordinates and velocities of the model with the new locks."""
+        """Lock or release the knee of `turn`, and return coordinates and velocities of the model with the new locks.
+
+        q, v  coordinates and velocities of the old model at that instant
+        """
         walker = self.scene.ours
         walk_state = self.walk_state
         y = self.scene.about_centre(q, v)
@@ -231,7 +233,7 @@ def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float,
     far = contact_state.farthest_slide(scene.ground.terrain)
     if abs(along - walk_state.foothold[foot]) <= far:
         return False
-    # A round foot also moves away from its foothold as it rolls. Only the way of its material is sliding.
+    # A round foot moves away from its foothold also by rolling. Only motion of its material is sliding.
     y = tuple(scene.about_centre(q, v).tolist())
     material = contact_state.material_along(scene.ours.whole, foot, along, y)
     return bool(abs(material - walk_state.touched[foot]) > far)
@@ -247,7 +249,7 @@ def first_turn(
 ) -> Turn | None:
     """Return the first lock or release of a knee within a step of h (s), or None if no knee locks or is released.
 
-    pushing_s  rest of the push-off at the start of the step
+    pushing_s  time (s) for which the push-off continues after the start of the step
     sinking    vertical velocities (m/s) of the stance foot at both ends of the step
     knees      bend of each knee at both ends of the step
     """
@@ -279,7 +281,7 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
             low = middle
         else:
             high = middle
-    # The end on the far side of zero, so that the foot has crossed.
+    # Return the end on the far side of zero, where the foot has certainly crossed.
     return high
 
 
@@ -291,6 +293,6 @@ def foot_within_step(old: FootMotion, new: FootMotion, share: float, h: float) -
 
 
 def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:
-    """Evaluate a cubic at the fraction s of a step from its values and rates at both ends of the step."""
+    """Evaluate a cubic at the fraction s of a step of h (s), from values x and rates v at both ends of the step."""
     r = 1.0 - s
     return r * r * ((1.0 + 2.0 * s) * x0 + s * h * v0) + s * s * ((3.0 - 2.0 * s) * x1 - r * h * v1)

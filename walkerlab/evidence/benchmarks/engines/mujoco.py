@@ -16,7 +16,7 @@ CANNOT_EXPRESS = (
     "point feet: a ball of half a millimetre replaces each",
     "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",
 )
-NEVER_M = -1e9  # margin of a contact that never acts
+NEVER_M = -1e9  # margin so negative that the contact never acts
 INTEGRATOR_CODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
@@ -29,7 +29,7 @@ class MujocoRun(adapter.Simulation):
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         import mujoco
 
-        mujoco.set_mjcb_passive(None)  # the callback is global: remove that of the last run
+        mujoco.set_mjcb_passive(None)  # the callback is global, so that of the last run would still act
         self._advance = mujoco.mj_step
         self._model = mujoco.MjModel.from_xml_string(model_xml(model, self.own))
         self._model.opt.timestep = self.stepping.step_s
@@ -42,7 +42,7 @@ class MujocoRun(adapter.Simulation):
         model = self._model
         data = self._data
         advance = self._advance
-        # The arrays are views of MuJoCo's memory, so they follow the motion.
+        # The arrays are views of MuJoCo's memory, so they need not be read again after a step.
         q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
         for count in range(1, min(steps, round(until_s / h)) + 1):
             advance(model, data)
@@ -51,7 +51,7 @@ class MujocoRun(adapter.Simulation):
 
     def carry(self, ball: int, has_ground: bool) -> None:
         if self._model.npair:
-            # No distance is below a margin of this size, so the pair is never in contact.
+            # No distance is below such a margin, so the pair is never in contact.
             self._model.pair_margin[self._model.pair(f"foot {ball} on floor").id] = 0.0 if has_ground else NEVER_M
 
 
@@ -68,7 +68,7 @@ def force_callback(forces: adapter.Forces, data: Any) -> Any:
 
 
 def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
-    """Write the model as MJCF, with a floor for its feet if the engine's own contact is used."""
+    """Write the model as MJCF, with a floor for the feet if native contact is used."""
     contact = None if own is None else own.settings
     floor = ""
     pairs = ""

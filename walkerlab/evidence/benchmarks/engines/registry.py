@@ -1,4 +1,4 @@
-"""Engines with which walks are compared. What they need is imported only when they run."""
+"""Engines with which our walks are compared. Their packages are imported only when they run."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in the output, also that of the adapter module and of the distribution to install
+    name: str  # name in the output, of the adapter module and of the distribution to install
     module: str  # import name of its package
     core: str = ""  # distribution of the library itself, if it can be installed alone
 
     @property
     def is_installed(self) -> bool:
-        """Whether the engine can be imported, found without importing it."""
+        """Whether the engine can be imported. This does not import it."""
         return importlib.util.find_spec(self.module) is not None
 
     @property
@@ -35,7 +35,7 @@ class Engine:
     @property
     def version(self) -> str:
         """Version of the installed library, or "unknown" for a module without a distribution."""
-        # the core comes first, because the distribution around it may be missing or have another version
+        # The core comes first, because the distribution that contains it may be missing or have another version.
         for distribution in filter(None, (self.core, self.name)):
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
                 return importlib.metadata.version(distribution)

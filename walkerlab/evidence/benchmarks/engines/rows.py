@@ -10,7 +10,7 @@ SAME_LAW = "same-law"
 OWN_LAW = "own-law"
 TOLERANCE = Label("1", "relative tolerance of an adaptive integrator")
 RUN_TIME = Label("s", "run time", timing=True)
-FROM_REFERENCE = "difference from the reference in the end state (SI); on own contact, in the last period (s)"
+FROM_REFERENCE = "difference from the reference in the end state (SI) or, on own contact, in the last period (s)"
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class EngineRow:
     integrator: Annotated[str, Label("1", "integrator, or the engine's own contact model")]
     start: Annotated[float, Label("1", "start velocities relative to the gait's")]
     # for an adaptive run that was lost, the largest step allowed
-    step_s: Annotated[float, Label("s", "step size; the mean for adaptive integrators")]
+    step_s: Annotated[float, Label("s", "step size, or its mean for adaptive integrators")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
-    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop; None if the process was lost
+    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop, or None if the process was lost
     period_s: Annotated[float | None, Label("s", "period of the last step")]
     step_length_m: Annotated[float | None, Label("m", "length of the last step")]
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]
@@ -39,13 +39,13 @@ class EngineRow:
 
 @dataclass(frozen=True)
 class SwingRow:
-    """Swing of the pinned walker, without ground contact. An integrator's first run has no observed order."""
+    """Swing of the pinned walker, without ground contact. The first run of an integrator has no observed order."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
     integrator: Annotated[str, Label("1", "integrator")]
     promised_order: Annotated[int, Label("1", "nominal order")]
-    step_s: Annotated[float, Label("s", "step size; the largest for adaptive integrators")]
+    step_s: Annotated[float, Label("s", "step size, or the largest for adaptive integrators")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float, Label("1", "largest difference of the end state, rad and rad/s")]
     energy_drift_j: Annotated[float, Label("J", "change of the mechanical energy")]
@@ -55,7 +55,7 @@ class SwingRow:
 
 @dataclass(frozen=True)
 class TuningRow:
-    """Property of a tuned contact model, and its target."""
+    """A measured property of a tuned contact model, and the target."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]

@@ -1,4 +1,4 @@
-"""Tasks for an engine's process: a walk, a swing without ground, and tests of its contact with a ball and a block."""
+"""Tasks for the process of an engine: a walk, a swing without ground, and tests of contact with a ball and a block."""
 
 import math
 import time
@@ -21,7 +21,7 @@ from walkerlab.physics.solvers.system import Floats
 
 TIME_ROUNDING = 1e-9  # relative tolerance for times
 UNLIMITED_STEPS = 10_000_000
-STEADY_STEP_FACTOR = 5  # factor on the step size if only a steady end state is needed
+STEADY_STEP_FACTOR = 5  # if only a steady end state is needed, steps may be this many times as large
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class WalkAnswer:
     """Result of a walk in an engine."""
 
     outcome: str
-    end: Floats | None  # final state of the free walker; None unless the walk was completed
+    end: Floats | None  # final state of the free walker, or None unless the walk was completed
     touches_s: Floats  # (steps,) touch times
     along_m: Floats  # (steps,) positions of the footholds along the slope
-    slips_m: Floats  # (steps,) net slips; the last step has none if its foot has not lifted
+    slips_m: Floats  # (steps,) net slips, without that of the last step if the foot has not lifted
     steps: int  # engine steps
     time_s: float  # simulated time
     wall_s: float  # processor time of the loop
@@ -40,14 +40,14 @@ class WalkAnswer:
 
 @dataclass(frozen=True)
 class WalkTask:
-    """A walk with an engine's integrator, on our contact law or the engine's."""
+    """A walk with the integrator of an engine, on our contact law or on that of the engine."""
 
     engine: str
     stepping: Stepping
     scene: EngineScene
     touches: int  # number of touches after which the walk ends
-    until_s: float  # latest end
-    own: OwnContact | None  # the engine's tuned contact; None for our law
+    until_s: float  # time at which the walk ends at the latest
+    own: OwnContact | None  # the engine's tuned contact, or None for our law
     max_steps: int  # step budget of the engine
 
     def run(self) -> WalkAnswer:
@@ -67,7 +67,7 @@ class WalkTask:
 
 
 class EngineWalk:
-    """Walk in an engine, which continues in a new model after each lock or release of a knee."""
+    """Walk in an engine. After each lock or release of a knee it continues in a new model."""
 
     def __init__(self, task: WalkTask) -> None:
         self.task = task
@@ -83,7 +83,7 @@ class EngineWalk:
         return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
 
     def walk_to_end(self) -> None:
-        """Walk to the end. A step in which a knee locks or is released is repeated up to that instant."""
+        """Walk to the end. If a knee locks or is released within an engine step, repeat the step up to that instant."""
         rules = self.rules
         while rules.outcome is None and not self.is_over and self.steps < self.task.max_steps:
             self._simulate(self.task.until_s)
@@ -98,7 +98,7 @@ class EngineWalk:
                 self.q, self.v = rules.go_on(self.q, self.v)
 
     def _simulate(self, until_s: float) -> None:
-        """Simulate from the current state to `until_s`. Fixed steps are shortened so that a whole number fits."""
+        """Simulate from the current state to `until_s`. Fixed steps are shortened until a whole number fits."""
         task = self.task
         rules = self.rules
         span = until_s - self.time_s
@@ -176,7 +176,7 @@ class EngineMotion(NamedTuple):
 
 
 def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotion:
-    """Simulate, recording the state at the end of each step."""
+    """Simulate and record the state at the end of each step."""
     records: list[tuple[float, Floats, Floats]] = []
 
     def monitor(time_s: float, q: Floats, v: Floats) -> bool:
@@ -196,7 +196,7 @@ def pinned_model(scene: EngineScene) -> planar.PlanarModel:
 
 @dataclass(frozen=True)
 class TuningAnswer:
-    """Measured properties of an engine's own contact, to compare with the target."""
+    """Measured properties of an engine's native contact, to compare with the target."""
 
     own: OwnContact
     penetration: float  # m, penetration of the ball at rest
@@ -207,9 +207,9 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class TuningTask:
-    """Task that tunes an engine's own contact and measures it with a heavy ball that cannot turn.
+    """Task that tunes the native contact of an engine, and measures it with a heavy ball that cannot turn.
 
-    The ball bounces on level ground, and serves as a sliding block on level or inclined ground.
+    The ball bounces on level ground. It also serves as a block that slides on level ground or creeps on an incline.
     """
 
     engine: str
@@ -224,14 +224,12 @@ class TuningTask:
 
     @property
     def omega(self) -> float:
-        """Angular frequency (rad/s) of the undamped ball about rest, according to the target."""
+        """Angular frequency (rad/s) at which the undamped ball would bounce about rest on the target contact."""
         return math.sqrt(self.target.gravity / self.target.penetration)
 
     @property
     def settling_s(self) -> float:
-        """Time (s) after which the ball is taken to be at rest: eight times its slower time constant on the target
-        contact.
-        """
+        """Time (s) after which the ball counts as at rest: eight times the slower time constant of the target."""
         ratio = self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
         return 8.0 / slow
@@ -244,9 +242,12 @@ class TuningTask:
     def simulate_contact(
         self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]
     ) -> EngineMotion:
-        """Simulate the ball from `depth` (m) inside the ground. `along` times its weight pulls it along the ground.
+        """Simulate the ball, which starts inside the ground and is pulled along it.
 
-        h  step size (s)
+        h         step size (s)
+        along     pull along the ground, as a fraction of the weight
+        depth     initial penetration (m)
+        velocity  initial velocity along and normal to the ground (m/s)
         """
         target = self.target
         engine = PHYSICS_ENGINES[self.engine]
@@ -260,19 +261,20 @@ class TuningTask:
         return record_motion(simulation, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
     def penetration_at_rest(self) -> float:
-        """Return the penetration (m) at rest of a ball dropped from the surface."""
+        """Return the penetration at rest (m) of a ball that is released at the surface."""
         return -float(
             self.simulate_contact(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1]
         )
 
     def damping_ratio(self, depth: float) -> float:
-        """Fit an oscillator to the ball's accelerations and return its damping ratio. `depth` is the penetration at
-        rest (m).
+        """Fit an oscillator to the accelerations of the ball, and return its damping ratio.
+
+        depth  penetration at rest (m)
         """
         omega = self.omega
         motion = self.simulate_contact(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
-        # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
+        # Engines integrate by different rules, so we take the mean of both ends of a step for its middle.
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
         (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
         stiffness = k / depth
@@ -280,7 +282,10 @@ class TuningTask:
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
-        """Return the deceleration of a sliding block, divided by gravity. `depth` is the penetration at rest (m)."""
+        """Return the friction coefficient: the deceleration of a sliding block, divided by gravity.
+
+        depth  penetration at rest (m)
+        """
         target = self.target
         settled = self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
@@ -291,7 +296,10 @@ class TuningTask:
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
-        """Return the creep velocity (m/s) of a block standing on an incline. `depth` is the penetration at rest (m)."""
+        """Return the creep velocity (m/s) of a block that stands on an incline.
+
+        depth  penetration at rest (m)
+        """
         target = self.target
         h = STEADY_STEP_FACTOR * self.step_s
         return float(

@@ -1,4 +1,4 @@
-"""Report section on other engines: their integrators under our law, and their own contact."""
+"""Report section on other engines: their integrators under our law, and their native contact."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -98,7 +98,7 @@ LIMIT_COLUMNS = (Column("engine"), Column("cannot express", wide=True))
 
 
 def swings(runs: Sequence[Row]) -> Table:
-    """Build the table of the pinned swing: each integrator's most accurate run, and the orders of all its runs."""
+    """Build the table of the pinned swing: the most accurate run of each integrator, and the orders of all its runs."""
     finest = []
     for swung in grouped(runs, "scene", "engine", "integrator").values():
         orders = ", ".join(number(run["order"], 3) for run in swung if run["order"] is not None)

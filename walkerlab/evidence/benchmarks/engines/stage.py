@@ -1,5 +1,6 @@
-"""Stage `engines`: error against run time with our law in other engines' integrators, then with their
-native contact, for the walkers that engines support.
+"""Stage `engines`: error against run time in other engines, for the walkers that they support.
+
+The engines first integrate our contact law, then their native contact.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +36,7 @@ from walkerlab.scene.parts import assembly_of
 def supported_scene(
     config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
 ) -> EngineScene:
-    """Return a config's scene for engines, see `engine_scene`.
+    """Return the scene of a config for engines, as `engine_scene` does.
 
     Raises ConfigError for a walker that other engines do not support.
     """
@@ -52,7 +53,7 @@ def supported_scene(
     points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
     if any(points) and not all(points):
         raise ConfigError(
-            "engines: one foot is a point, the other is round. A point foot needs ground lower by the ball's radius.",
+            "engines: one foot is a point, the other is round. A ball replaces the point and needs lower ground.",
             f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)
@@ -60,12 +61,12 @@ def supported_scene(
 
 
 RATIO_LEVELS = (1e-3, 1e-5)
-THREE_DIGITS = 5e-4  # relative error
+THREE_DIGITS = 5e-4  # largest relative error of a value with three correct digits
 
 
 @dataclass
 class EngineFindings:
-    """Results of the stage, collected row by row."""
+    """Results of the stage, to which rows are added one by one."""
 
     rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
@@ -80,7 +81,7 @@ class EngineFindings:
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure all installed engines, `jobs` at a time.
 
-    Raises NoAnswer if no engine or walk exists.
+    Raises NoAnswer if no engine is installed, or if our walk ends too early.
     """
     engines = installed()
     findings = EngineFindings(left_out=[*missing_engines(), *pinning_left_out(config, "engines")])
@@ -105,7 +106,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
-    """Yield each engine's results, `jobs` engines at a time. An interruption kills the running engines."""
+    """Yield the results of each engine, `jobs` engines at a time. An interruption kills the running engines."""
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         try:
             yield from pool.map(measure, pairs)
@@ -148,8 +149,9 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 def make_content(
     findings: EngineFindings, scene: str, truth: experiments.Truth, rigid: Mapping[str, Any] | None
 ) -> Content:
-    """Build groups and summary. `rigid` is the summary of `fixedpoint`, or None if neither the start nor the pads need
-    it.
+    """Build groups and summary.
+
+    rigid  summary of `fixedpoint`, or None if neither the start nor the pads need a gait
     """
     rows = findings.rows
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
@@ -189,7 +191,7 @@ def make_content(
 
 
 def series_by_name(rows: Sequence[EngineRow], experiment: str) -> dict[str, list[EngineRow]]:
-    """Return an experiment's rows that start on the gait, by engine and integrator (or contact), coarse to fine."""
+    """Return the rows of an experiment that start on the gait, from coarse to fine, by engine and integrator."""
     series: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.experiment == experiment and row.engine != OURS and row.start == 1.0:
@@ -198,7 +200,7 @@ def series_by_name(rows: Sequence[EngineRow], experiment: str) -> dict[str, list
 
 
 def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
-    """Return each engine's run time divided by ours under our law, for each error level that both reach."""
+    """Return the run time of each engine under our law, divided by ours, for each error level that both reach."""
     by_engine: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.experiment == SAME_LAW and row.start == 1.0:
@@ -215,7 +217,7 @@ def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
 
 
 def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
-    """Return the contact whose finest walk comes closest to ADAMS's law, or None if no walk reaches the end."""
+    """Return the native contact whose finest walk is closest to ADAMS's law, or None if no walk is completed."""
     finest = [series[-1] for series in series_by_name(rows, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
@@ -225,8 +227,8 @@ def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """Return the largest step (s) with three correct digits of the last period, by experiment and name."""
-    # digits are checked against the reference under our law, and against the finest run on an engine's own contact
+    """Return the largest step (s) that gives three correct digits of the last period, by experiment and name."""
+    # Under our law the digits are those of the reference. Native contact has no reference but the finest run.
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
@@ -247,14 +249,16 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
         if row.outcome != "walked" or row.period_s is None or abs(row.period_s / target - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
-    # on an engine's own contact the finest run is the target itself, so it is no evidence
+    # On native contact the finest run is the target itself, so its digits prove nothing.
     finest_only = experiment == OWN_LAW and good == runs[-1].step_s
     return None if finest_only else good
 
 
 def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
-    """Return the effect of each series' last refinement, by experiment and name."""
-    # same law: factor by which the error fell; own law: change of the period (s)
+    """Return the effect of the last refinement of each series, by experiment and name.
+
+    Under our law it is the factor by which the error fell, on native contact the change of the period (s).
+    """
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
         for name, runs in series_by_name(rows, experiment).items():

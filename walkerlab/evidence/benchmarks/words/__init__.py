@@ -1,4 +1,4 @@
-"""Templates for the conclusions on run times and errors, one file per stage."""
+"""Templates for the conclusions on run times and errors. Each stage has a file."""
 
 from pathlib import Path
 

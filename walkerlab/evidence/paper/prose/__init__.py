@@ -1,6 +1,6 @@
-"""Templates for texts about the paper, which can use its printed values and quantities derived from them.
+"""Templates for texts about the paper. They can use its printed values, and functions that derive others from them.
 
-This is a package of its own, so that its words affect only the results of modules that import it.
+This is a separate package, so that a change of words affects only the results of modules that import it.
 """
 
 import math
