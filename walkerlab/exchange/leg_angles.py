@@ -1,4 +1,4 @@
-"""Repair recorded leg angles before heel strikes are sought: full turns, swapped legs, outliers, signs, return walks.
+"""Repairs of recorded leg angles before the search for heel strikes: turns, swapped legs, outliers, signs, ways back.
 
 Each repair is listed in the doubts of the walk, with samples and times.
 """
@@ -56,7 +56,7 @@ def add_doubt(walk: RecordedWalk, doubt: str) -> RecordedWalk:
 
 
 def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Undo jumps by full turns, and subtract half a turn from angles that are measured from the upward vertical.
+    """Undo jumps by full turns. Subtract half a turn from angles that are measured from the upward vertical.
 
     Raises ConfigError for angles in another unit, and for a leg that is not near the vertical.
     """
@@ -86,7 +86,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
 
 
 def swap_back(walk: RecordedWalk) -> RecordedWalk:
-    """Swap the legs back where their angles change places from one sample to the next."""
+    """Swap the legs back where their angles are exchanged from one sample to the next."""
     angle = read_leg_angles(walk)
     swapped = swapped_rows(walk.time_s, angle[:, :1] - angle[:, 1:])
     if not swapped.any():
@@ -133,8 +133,8 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     """Make angles positive with the foot ahead, and keep the longest stretch in one direction.
 
-    The legs swing in opposite directions. As they pass each other, the swing foot moves forwards relative to the hip,
-    and faster than the foot on the ground moves backwards.
+    As the legs pass each other, the swing foot moves forwards relative to the hip, faster than the foot on the ground
+    moves backwards.
     """
     angle = read_leg_angles(walk)
     swing = angle - np.mean(angle, axis=0)
@@ -180,7 +180,7 @@ def find_ways(time: Array, angle: Array) -> list[Way]:
 
 
 def trend(time: Array, values: Array) -> float:
-    """Fit a line through values, and return its slope divided by the standard error of the slope."""
+    """Fit a line to values, and return its slope divided by the standard error of the slope."""
     share = (time - np.mean(time)) / np.ptp(time)
     slope = float(share @ values) / float(share @ share)
     residuals = values - np.mean(values) - slope * share
@@ -188,9 +188,7 @@ def trend(time: Array, values: Array) -> float:
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample, between two stretches, at which the hip turns round. Without markers, return the middle
-    one.
-    """
+    """Return the sample between two stretches at which the hip turns round, or the middle sample without markers."""
     begin = before.passings[-1][1]
     end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)

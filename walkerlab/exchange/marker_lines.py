@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk runs along the horizontal line on which the legs move most relative to each other. Which way it runs shows only
-when the legs pass each other, see `leg_angles`.
+The walk runs along the horizontal line on which the legs move most relative to each other. In which of the two
+directions, shows only when the legs pass each other, see `leg_angles`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Line = tuple[Array, Array]
 """Positions (samples, axes) of the upper and the lower marker (m)."""
 
 NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
-JUMP: Final = 8.0  # smallest jump of a line's length between samples, in standard deviations of all changes
-SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
+JUMP: Final = 8.0  # smallest change of length that counts as a jump, in standard deviations of all changes
+SMALLEST_JUMP: Final = 0.01  # and as a fraction of the length
 NEIGHBOURS: Final = 5  # a change is compared with the median of this many neighbouring changes
 HUGE: Final = 1e50  # larger values count as gaps, because their squares overflow
 FEWEST_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
@@ -29,12 +29,12 @@ LONGEST_LEAP: Final = 1.5  # a leap may span at most this many times the number 
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
 ONE_HIP: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
-NORMAL: Final = 1.4826  # ratio of standard deviation to median absolute deviation in a normal distribution
+NORMAL: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
 RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
-FAST_PERCENT: Final = 80  # percentile of the motions between samples above which they count as fast
+FAST_PERCENT: Final = 80  # motions between samples above this percentile count as fast
 EXCHANGE: Final = 0.2  # an exchange of legs lowers the squared unevenness by at least this many squared fast motions
 SCATTER: Final = 40.0  # and by at least this multiple of the median squared unevenness
 
@@ -53,7 +53,7 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Describe the samples where `rows` (samples,) is true by their numbers in the file and their times."""
+    """Describe the samples that `rows` (samples,) marks, by their numbers in the file and their times."""
 
     def spell_times(first: int, last: int) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
@@ -62,12 +62,12 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def spell_rows(rows: NDArray[np.bool_]) -> str:
-    """Describe the samples where `rows` (samples,) is true by their numbers, which count from 1."""
+    """Describe the samples that `rows` (samples,) marks, by their numbers counted from 1."""
     return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
 def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
-    """Describe the samples where `rows` (samples,) is true, by their `numbers`.
+    """Describe the samples that `rows` (samples,) marks, by their `numbers` (samples,).
 
     If given, `addition(first, last)` returns a text to append to each stretch.
     """
@@ -81,7 +81,7 @@ def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[i
 
 
 def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) at which two points are exchanged, at most half of them.
+    """Find the samples (samples,) at which two points are exchanged, at most half of all.
 
     Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each one must make the
     motion more even by more than fast motions or scatter can explain.
@@ -102,8 +102,8 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
     fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
     least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
-    # Consecutive exchanges between n samples can change the unevenness at these n samples only, and cost n - 1 times
-    # `least`. So without any stretch of samples that could gain as much, there are none.
+    # Exchanges in n consecutive samples change the unevenness of these samples only, and cost n - 1 times `least`. If
+    # no stretch of samples could gain that much, there are no exchanges, and the slow search below is not needed.
     gains = np.pad(costs[0][0] - np.min(costs, axis=(0, 1)), 1)
     sums = np.append(0.0, np.cumsum(gains - least))
     if np.all(sums[2:] - np.minimum.accumulate(sums)[:-2] <= -least):
@@ -123,14 +123,14 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     mended = np.where(swapped[:, None], -apart, apart)
     rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
     for first, last in apart_runs(swapped, swapped):
-        # an outlier of one of the two points is not an exchange
+        # If one of the two points has an outlier here, this is not an exchange.
         if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
             swapped[first : last + 1] = False
     return np.asarray(swapped)
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each pair that was mended."""
+    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each exchanged pair."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -176,7 +176,7 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     for _ in range(PLANE_FITS):
         # The small term puts horizontal directions first, even if the legs do not move.
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
-        # a marker that jumps sideways would turn the plane
+        # Left in, a marker that jumps sideways would turn the plane.
         off = np.abs(motion @ sideways - np.median(motion @ sideways))
         motion = motion[off <= JUMP * NORMAL * np.median(off) + SMALLEST_JUMP * np.ptp(motion @ ahead)]
     drift = float((legs[0][0][-1] - legs[0][0][0]) @ ahead)
@@ -200,7 +200,7 @@ def stated_direction(walks: str, up: Array) -> Array:
 def unseen_as_gaps(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Replace markers that were not seen by gaps. Also return, by column, which values were replaced.
+    """Replace the coordinates of markers that were not seen by gaps. Also return the reasons, by column.
 
     Programs write zeros, or another value, for all coordinates of a marker that they did not see. A foot may also stand
     at the origin, so equal coordinates are a gap only if they give the line an unusual length.
@@ -230,7 +230,7 @@ def unseen_as_gaps(
 
 
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
+    """Find the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
 
     Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
     missing, because a foot may have stood still before the gap.
@@ -248,7 +248,7 @@ def frozen_rows(places: Array) -> NDArray[np.bool_]:
 
 
 def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[NDArray[np.bool_], list[str]]:
-    """Mark the samples at which a marker freezes, or the length of a line jumps and returns. Also describes all jumps.
+    """Find the samples at which a marker freezes, or the length of a line jumps and returns. Also return doubts.
 
     Legs are rigid and knees bend smoothly, so the length of a line never really jumps.
     """
@@ -322,7 +322,7 @@ def refuse_running(lines: Mapping[str, Line], plane: WalkPlane, source: str) -> 
     hip = np.mean([top @ plane.up for top, _ in legs], axis=0)
     if np.count_nonzero(np.diff(np.sign(spread - np.mean(spread)))) < FEWEST_SWINGS or not np.ptp(hip):
         return
-    # On a slope the hip also sinks steadily.
+    # On a slope the hip also sinks steadily, so the trend is removed.
     trend = np.polynomial.Polynomial.fit(np.arange(hip.size), hip, 1)
     if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING:
         raise ConfigError(
