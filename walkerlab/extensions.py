@@ -173,7 +173,7 @@ def extensions() -> dict[str, Extension]:
 
 
 def declared(kind: str) -> dict[str, str]:
-    """Return the code that all extensions declare in a field that is a mapping, or for values of a config key."""
+    """Return the code that all extensions add, by name. `kind` is a field of `Extension`, or a config key."""
     return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
 
 

@@ -49,7 +49,7 @@ class LoadedConfig:
 
     @property
     def base(self) -> Config:
-        """The config without settings."""
+        """The config without the changes by `--set` and `--strides`."""
         return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
     def add_position(self, error: ConfigError) -> ConfigError:
@@ -127,9 +127,7 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: a leg mass that did not move with its leg, wrong units, a pitch without
-    pads.
-    """
+    """Yield warnings about likely mistakes: wrong units, a pitch without pads, a mass that did not move with its leg."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
@@ -180,7 +178,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List each key in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg replaces slope_rad."""
+    """List the keys in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg stands for slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
@@ -190,7 +188,7 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
     differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
-    # If a block was null, a null key in it is no change.
+    # A key that is null in a new block is no change if the block was null before.
     absent = {f"{key}." for key, value in values_before.items() if value is None}
     differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:
@@ -224,7 +222,7 @@ def _word(value: Any) -> str:
 
 
 def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes (nested keys with values). Error messages name their `source`.
+    """Build the paper config with changes. `lines` are nested keys with values, whose `source` error messages name.
 
     Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
     """

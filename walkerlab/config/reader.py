@@ -34,7 +34,7 @@ def value_of(text: str) -> str | int | float | bool | None:
     """Convert a plain scalar to a value by the rules of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
-    # Python takes quadratic time to convert a long integer.
+    # Longer integers stay text, because Python takes quadratic time to convert them.
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text)
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:

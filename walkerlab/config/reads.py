@@ -12,7 +12,7 @@ from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Protocol
 
-# The command line's help uses types of this module and must load neither the schema nor pydantic.
+# The help of the command line uses types of this module. Loading the schema and pydantic would slow it down.
 if TYPE_CHECKING:
     from walkerlab.config import schema
     from walkerlab.config.analyses import Basin, Case, Continuation, Design, Plan, Robustness
@@ -35,7 +35,7 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # config blocks, which are not Protocols, are read completely
+    # Config blocks are not Protocols and are read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
@@ -285,7 +285,7 @@ def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> 
 
 
 def canonical_json(data: Any) -> str:
-    """Serialise so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
+    """Return JSON that is the same for equal content: sorted keys, no blanks, ASCII, shortest floats.
 
     Raises ValueError if a number is not finite.
     """

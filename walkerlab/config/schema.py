@@ -54,7 +54,7 @@ class SlopeInDegrees(Block):
 SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
 StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
-# null in place of an angle or rate that follows from the others
+# An angle or rate that follows from the others may be null.
 State = tuple[SwingAngle | None, StanceAngle, Rate, Rate]
 LongState = tuple[Rate | None, ...]  # states of walkers with more bodies than two legs
 
@@ -85,7 +85,7 @@ def replace_state(start: Any, state: tuple[float, ...]) -> Any:
 
 
 def kind_of_start(value: Any) -> str:
-    """Return the union tag of a `start` value: its kind of state, or word."""
+    """Return the tag by which pydantic chooses the type of a `start` value: a kind of state, or a word."""
     if isinstance(value, list | tuple):
         return "state" if len(value) <= 4 else "long"
     return MID_STEP if isinstance(value, dict | MidStep) else "word"

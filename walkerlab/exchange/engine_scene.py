@@ -94,7 +94,7 @@ class EngineScene:
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def scale_start(self, factor: float) -> "EngineScene":
-        """Multiply the initial velocities by `factor`, without slip of the stance foot, and return the changed scene."""
+        """Return the scene with the initial velocities multiplied by `factor`. The stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 

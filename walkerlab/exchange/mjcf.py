@@ -337,7 +337,8 @@ def limbs(export: Exported, foot: int) -> dict[int, Position]:
 def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
     """Draw a part of a leg as a capsule from its hinge to its lower end. It collides with nothing.
 
-    A capsule that ends at the foot is shortened. Otherwise it could reach below the ball in programs that let it collide.
+    A capsule that ends at the foot is shortened. Otherwise it could reach below the ball in programs that let it
+    collide.
     """
     (x, z), (a, c), y = hinge, end, foot.across_m
     width = 0.015 * math.hypot(x - a, z - c)

@@ -93,7 +93,7 @@ def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
     """
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
-        Option("--units", "units", "KIND=UNIT,...", "Units of columns whose file does not state them.", "units"),
+        Option("--units", "units", "KIND=UNIT,...", "Units of columns, where the file does not state them.", "units"),
         Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
         Option(
             "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line from which angles are measured."

@@ -58,11 +58,11 @@ class InPlace(SizedExecutor):
 
 
 class JobEndsError(BaseException):
-    """Error that a signal raises in a job that a cluster is about to end."""
+    """Raised in a cluster's job by the signal that announces its end."""
 
 
 class JobEndedError(WalkerlabError):
-    """Error for a cluster's job that ended before it had computed one unit."""
+    """Raised for a cluster's job that ended before it had computed one unit."""
 
     exit_code = 4
 

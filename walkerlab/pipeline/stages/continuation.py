@@ -31,7 +31,7 @@ from walkerlab.scene.subject import contact_map, model_differs, rigid_map, steps
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
-"""Seeds, and a function that returns a config's step map over the parameter."""
+"""Seeds of a search, and a function that returns the step map of a config over the parameter."""
 SHORTEST_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
 TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
@@ -306,7 +306,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 def sample_again(family: Family) -> dict[str, Any] | None:
     """Solve again for a sample of gaits at tighter tolerances. Return the largest changes, or None without a gait."""
-    # Gaits are solved again, not only simulated, so that the change includes the residual of Newton's method.
+    # A simulation alone would not show the residual of Newton's method.
     step_map = family.step_map
     every = [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
@@ -398,7 +398,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     attractors = family.attractors
     exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
-    # Between the last flip that was followed and the limit of the cascade, gaits of longer periods are stable.
+    # Gaits of longer periods than were followed are stable from the last flip to the limit of the cascade.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
         attractor.value

@@ -106,7 +106,7 @@ def read_data(config: IdentifyConfig) -> MeasuredFile:
 
 
 def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification]) -> Identification:
-    """Try divisions of the walk into steps, and return the first that fits or, if none does, the most usable one."""
+    """Fit each division of the walk into steps. Return the first good fit or, if none is good, the most usable one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
     for measured in file.divisions():
@@ -125,7 +125,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
 def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Fit again if the identified slope, sensors or soles move heel strikes, or keep the old fit if this one is bad."""
+    """Fit again if the identified slope, sensors or soles move the heel strikes. Keep the old fit if the new one is bad."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
@@ -197,7 +197,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a prior, with its distance from the estimate by the walk alone, in standard errors of the difference."""
+    """Return a prior and its distance from the estimate by the walk alone, in standard errors of the difference."""
     return {
         "key": pull.key,
         "value": pull.value,
@@ -267,7 +267,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     """
     measured = result.measured
     walker = rigid_walker(config)
-    # the leg that swings first is shown as leg 1
+    # The motion player shows the leg that swings first as leg 1.
     walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
@@ -300,7 +300,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
     """Return the masses in the config that were not fitted. The estimated masses are relative to them."""
-    # empty for the contact model, whose stiffness sets the scale of mass
+    # The contact model needs no reference, because the stiffness sets the scale of mass.
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}
     fields = (".".join(("walker", *path)) for path, _ in leaves(type(config.walker), held=config.walker))

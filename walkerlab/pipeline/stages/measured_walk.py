@@ -136,7 +136,7 @@ def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
 
 
 def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
-    """Yield possible sums (rad) of the leg angles at heel strike, measured from the slope's normal: 0, then others."""
+    """Yield the sums (rad) to try of the leg angles at heel strike, from the slope's normal. The first is 0."""
     yield 0.0
     if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
@@ -194,7 +194,7 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
-    # On a treadmill a step is as long as the way of the belt from touch to touch.
+    # On a treadmill the length of a step is the distance that the belt moves from touch to touch.
     if block.belt_speed_m_s and "length_m" not in values:
         values["length_m"] = block.belt_speed_m_s * period
     if "touch_angle_rad" in values:
@@ -231,7 +231,7 @@ def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, f
 
 
 def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> None:
-    """Raise ConfigError if a value (steps,), in SI units, is impossible for a step."""
+    """Raise ConfigError if one of the `values` (steps,), in SI units, is impossible for a step."""
     angle = name == "touch_angle_rad"
     possible = [abs(value) <= math.pi if angle else is_plausible(value) for value in values.tolist()]
     if all(possible):

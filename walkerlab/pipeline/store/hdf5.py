@@ -18,11 +18,13 @@ CONVENTIONS = "CF-1.11"
 ENCODING = "_Encoding"
 """Attribute by which xarray decodes text."""
 MIN_TEXT_BYTES = 2
-"""Minimum length of text in arrays; netCDF readers join texts of one byte along the last dimension."""
+"""Minimum length of text in arrays. Texts of one byte would be joined by netCDF readers along the last dimension."""
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
-LEAST_BYTES = 32
-"""Minimum size of a group's member in a file; it limits the number of members, even with circular links."""
+MIN_MEMBER_BYTES = 32
+"""Each member of a group takes at least this many bytes. So the size of a file bounds the number of its members, even
+if links are circular.
+"""
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
@@ -179,7 +181,7 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
     variables: dict[str, Variable] = {}
     members: dict[str, Any] = {}
     for name in sorted(parent):
-        budget.spend(LEAST_BYTES)
+        budget.spend(MIN_MEMBER_BYTES)
         if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"it holds a link, {name!r}")
         members[name] = parent[name]

@@ -210,11 +210,11 @@ class SlurmQueue:
     """
 
     def __init__(self, time_limit: str) -> None:
-        """Send no query yet. `time_limit` is that of the jobs (min)."""
+        """Remember the time limit of the jobs (min). Slurm is first queried when a state is needed."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
-        # The first query is sent at once.
+        # The time is shifted so that the first call of `state` queries Slurm without waiting.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:
