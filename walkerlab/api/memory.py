@@ -367,7 +367,7 @@ def identify(
     3.0
     """
     if isinstance(walk, Mapping):
-        # Columns take the same way as a file, so that both have the same checks and messages.
+        # Columns are written to a file, so that they have the same checks and messages as a file.
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "walk.csv"
             path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))
@@ -488,7 +488,7 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
         if not isinstance(scene[name], kinds):
             raise ConfigError(f"{name}: {scene[name]!r} is not a {name} block.", makers)
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
-    # The paper's source is wrong for another scene, and keys of its walker would be merged into those of another type.
+    # The paper is not the source of another scene, and keys of its walker would be merged into those of another type.
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.copy_without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])

@@ -102,7 +102,7 @@ def mujoco_model(
         gait, config = config, _config_of(config)
     start = config.config if isinstance(config, Run) else config
     scene = add_blocks(start, **{name: plain(value) for name, value in blocks.items()})
-    # Changed keys may change the gait, which is then found anew.
+    # If the changed keys change the gait, it has to be found again.
     if isinstance(start, Config) and _identity_of_gait(start) != _identity_of_gait(scene):
         gait = None
     text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None, gait).values()))

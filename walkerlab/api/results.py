@@ -64,7 +64,7 @@ class Result:
     artifact: Path | None = None
 
     def __getattr__(self, name: str) -> Value:
-        # Python asks for attributes such as __deepcopy__ before there is a summary.
+        # Python asks for attributes such as __deepcopy__ before there is a summary, for example to restore a copy.
         if name.startswith("_"):
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
         if name not in self._values:
@@ -105,7 +105,7 @@ class Result:
         return "\n".join([f"{type(self).__name__} of {self.stage}", *lines])
 
     def _repr_html_(self) -> str:
-        # Imported here: only notebooks show HTML.
+        # Imported here, because only notebooks show HTML.
         from walkerlab.views.report.answers import answer_html
 
         if self.no_answer is not None:
@@ -176,7 +176,7 @@ class Result:
         return tuple(self._drawable())
 
     def _drawable(self) -> dict[str, Illustration]:
-        # Imported here: it loads matplotlib.
+        # Imported here, because it loads matplotlib.
         from walkerlab.views.figures.stage import FIGURES
 
         results = {self.stage: cast(Identified, self.content)}

@@ -259,7 +259,7 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
 
     Raises ConfigError for anything else.
     """
-    # Imported late: few callers sweep.
+    # Imported here, because few callers sweep.
     from walkerlab.pipeline.sweeps.question import MAX_POINTS
 
     if isinstance(values, str) and not values.lstrip().startswith("["):

@@ -127,7 +127,7 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: wrong units, a pitch without pads, a mass that did not move with its leg."""
+    """Yield warnings about likely mistakes: wrong units, a pitch without pads, a mass not moved with its leg."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}

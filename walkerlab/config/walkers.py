@@ -17,7 +17,7 @@ from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error, short_number
 from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKneedLeg, SecondStraightLeg, lock_knee
 from walkerlab.errors import ConfigError
-from walkerlab.extensions import declared, load
+from walkerlab.extensions import code_by_word, load
 
 WISSE: Final = "Wisse, Walking Simulation Example, MATLAB files, Delft University of Technology (2003): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
@@ -62,7 +62,7 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that the foot radius is below `limit`, a function of the value of the key `of`. Messages call it `name`."""
+    """Validate that the foot radius is below `limit`, a function of the value of key `of`. Messages call it `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
@@ -632,7 +632,7 @@ def load_walkers() -> dict[str, type[Block]]:
     Types that cannot be imported are left out, with a warning.
     """
     types = {}
-    for word, code in declared("walkers").items():
+    for word, code in code_by_word("walkers").items():
         try:
             types[word] = load(code)
         except Exception as error:

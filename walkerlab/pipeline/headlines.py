@@ -53,7 +53,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "plot": (),
     "report": (),
 }  # fmt: skip
-"""Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
+"""Headline quantities of each stage. A name that ends in a dot covers all quantities below it."""
 MAX_HEADLINES: Final = 13
 WALK_QUANTITIES: Final = (
     "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "step_length_m", "numerical_error.",

@@ -42,7 +42,7 @@ class Reporter(Protocol):
         """Begin a stage, possibly while others run.
 
         place       its number among the stages to run and the reason for a rerun; '' for a single new stage
-        expected_s  its last run time (s), if known
+        expected_s  last run time of the stage (s), if known
         """
 
     def announce_page(self, summary: Mapping[str, Any], folder: Path) -> None:

@@ -1,6 +1,4 @@
-"""Build the contact model of a config, with only the parts that the config needs, the laws of its ground, and starts
-with scaled velocities, for maps and basins.
-"""
+"""Build the contact model of a config with only the parts that the config needs, and starts with scaled velocities."""
 
 from __future__ import annotations
 
@@ -43,7 +41,7 @@ if TYPE_CHECKING:
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-# The derivatives of a radau5 step are exact.
+# radau5, because the derivatives of its steps are exact.
 GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
@@ -138,7 +136,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
-    # A knee that is free in the rigid strike must not be rigid while the leading foot sinks in.
+    # A knee that is free in the rigid model's strike must not stay locked while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
@@ -164,7 +162,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
     rigid_step_length_m  initial pad pitch
     """
-    # A gait has no pinned step, and the search replaces this pitch by the gait's step length.
+    # The pitch is only a start: the search replaces it by the step length of the gait.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)
@@ -172,7 +170,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait, replacing pads by a plane that lets scuffing feet through."""
+    """Find the gait of the contact model on a plane without pads that lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
@@ -213,7 +211,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
-    # The bodies of a straight leg turn as one in the rigid model; here each has its own angle.
+    # In the rigid model the bodies of a straight leg turn as one. Here each of them has an angle.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -227,7 +225,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
-    # By definition, the static penetration is that under the whole weight, not under its part normal to the slope.
+    # The static penetration is defined under the whole weight, not under its component normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 
@@ -241,7 +239,7 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
     }
 
 
-# Except at boundaries between outcomes, these tolerances give the same map as the config's.
+# Tolerances of maps. They give the same map as the config's, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
 MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
@@ -261,7 +259,7 @@ def build_scaled_starts(
 
 
 def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
-    """Return period (s) and length (m) of each step of a gait, which is a single step for equal legs."""
+    """Return period (s) and length (m) of each step of a gait: one step for equal legs, otherwise two."""
     if len(gait.steps) == 1:
         return ((gait.period_s, gait.step.length_m),)
     return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))

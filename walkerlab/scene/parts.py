@@ -62,7 +62,7 @@ def replace_second_leg(walker: Assembly, other: Assembly) -> Assembly:
     sources = (walker, legs[0]), (other, legs[1])
     names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])
     bodies = {body.name: body for source, leg in sources for body in source.bodies if body.name in leg}
-    # The hip joins bodies of both legs, so the hinges within one leg are knees.
+    # Hinges within one leg are knees. The hip joins bodies of both legs.
     knees = tuple(j for source, leg in sources for j in source.joints if {j.parent, j.child} <= {*leg})
     return Assembly(
         bodies=tuple(bodies[name] for name in names),
@@ -175,7 +175,7 @@ class Drives(NamedTuple):
 
 def drive_parameters(config: RigidConfig) -> Drives:
     dampings = knee_dampings(config.walker)
-    # a knee is only damped
+    # Knees have no spring and no torque.
     knees = tuple((0.0, damping, 0.0) for damping in dampings) if any(dampings) else ()
     return Drives(config.walker.hip.parameters, push_offs(config.push_off), knees)
 

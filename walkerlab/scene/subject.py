@@ -62,7 +62,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
-    # Any step length will do to see whether two scenes differ.
+    # The step length does not matter, because the scenes are only compared.
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
     first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
@@ -138,7 +138,7 @@ class ModelUnderTest:
     @property
     def first_leg(self) -> int:
         """Leg (1 or 2) that swings in the first complete step from the gait's section."""
-        # On the contact model's section leg 1 has begun its swing, so the first complete step is that of leg 2.
+        # The section of the contact model lies within the swing of leg 1, so the first complete step is that of leg 2.
         return 1 if self.model == RIGID else 2
 
     @property
@@ -163,7 +163,7 @@ def find_model_gait(
     """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
-    note  receives a message about each difference from the scene of the config
+    note  called with a message about each difference from the scene of the config
 
     Raises NoAnswer if it has no gait.
     """

@@ -26,11 +26,11 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
 ]
-"""How an option's value is read; docs/adding.md has a table."""
+"""Ways to read the value of an option. They are listed in docs/adding.md."""
 
 
 def message_without_block(name: str) -> str:
-    """Return the message that the config lacks a block."""
+    """Return the message that the config lacks the block `name`."""
     return f"the config has no {name} block"
 
 
@@ -39,18 +39,18 @@ def nothing(_config: object) -> tuple[Any, ...]:
     return ()
 
 
-def nothing_else(_config: object) -> Mapping[str, Any]:
-    """Return an empty mapping, for stages whose results depend on nothing else."""
+def no_dependencies(_config: object) -> Mapping[str, Any]:
+    """Return an empty mapping, for stages whose results depend only on config, inputs and code."""
     return {}
 
 
 def dependency(name: str, code: str) -> Callable[[Config], Mapping[str, Any]]:
-    """Return a function that returns the value of a function of the config, "module:name", under a name."""
+    """Return a function of the config whose result is {name: value}. `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
 
 
 def results_of(*names: str) -> Inputs:
-    """Return a function that returns these stage names for every config."""
+    """Return a function of the config that returns these stage names for every config."""
     return lambda _config: names
 
 
@@ -67,7 +67,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 
 def walks_and(*names: str) -> Inputs:
-    """Return a function that returns the walking stages, `recorded-walk` if there is a recording, and `names`."""
+    """Return a function of the config that returns the walking stages, `recorded-walk` if recorded, and `names`."""
     return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
@@ -88,9 +88,7 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return options for facts that a recorded file does not state. They set keys of a block, and need some other
-    flags.
-    """
+    """Return options for facts that a recording does not state. They set keys of `block` and need the flags `needs`."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units of columns, where the file does not state them.", "units"),
@@ -132,7 +130,7 @@ class Stage:
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     # returns what else the result depends on, by name, such as digests of files and versions of other programs
-    depends_on: Callable[[Config], Mapping[str, Any]] = nothing_else
+    depends_on: Callable[[Config], Mapping[str, Any]] = no_dependencies
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
     # "module:name" of the `Offer` of the stage's command; empty for the usual one, which works on a run
     adds_command: str = ""
@@ -158,10 +156,10 @@ class Stage:
         return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: Config) -> str | None:
-        """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
+        """Return the reason why the stage has no result for the legs of a config, or None if it has one."""
         if not self.needs_equal_legs:
             return None
-        # Imported here: the command line's help needs neither, and equal legs need no mechanics.
+        # Imported here to keep the help of the command line fast. Equal legs need no mechanics.
         from walkerlab.config.second_leg import states_second_leg
 
         if not states_second_leg(config):
@@ -182,7 +180,7 @@ class Stage:
                 f"{target} needs two equal legs, but those of this walker differ.",
                 f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
             )
-        # Imported here: the command line's help needs neither.
+        # Imported here to keep the help of the command line fast.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
         if self.why_unsuited(config) is not None:

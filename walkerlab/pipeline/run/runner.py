@@ -112,7 +112,7 @@ def execute(
         reused = "" if options.force else "; its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
-            # decide again: another process may have worked in the folder until now
+            # Decide again, because another process may have worked in the folder until now.
             run = executor()
             run.carry_out([step.stage for step in steps if step.action == "run"])
     else:
@@ -147,7 +147,7 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     base = paper_config_with({}) if run.extends == DEFAULT else run.loaded.base
     # The new config describes the walker, not the question that found it.
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
-    # A path in `extends` is relative to the file that contains it.
+    # A path in `extends` is relative to the file in which it stands.
     typed = run.extends if run.extends in builtin_names() else os.path.relpath(run.extends, report.run_dir)
     return write_numbered(
         report.run_dir / f"{name}.yaml", to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
@@ -192,7 +192,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target or, if it has an answer, of the first stage that has none. None if all have one.
+    """Return the error of the target or, if it has an answer, of the first stage without one, or None if all have one.
 
     message  message and advice of the target's error; None if it has an answer
     """

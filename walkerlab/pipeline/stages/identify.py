@@ -125,7 +125,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
 def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Fit again if the identified slope, sensors or soles move the heel strikes. Keep the old fit if the new one is bad."""
+    """Fit again if the identified slope, sensors or soles move the heel strikes. If that fails, keep the old fit."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)

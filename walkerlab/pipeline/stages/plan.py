@@ -236,7 +236,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain if `measured` quantities of the first steps are known, and the open combinations."""
+    """Return the errors that remain if `measured` quantities of the first steps are known, and open combinations."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
     data = walk.data
     quantities = walk.forecast.quantities

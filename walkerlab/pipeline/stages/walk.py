@@ -386,7 +386,7 @@ def steps_to_repeat(steps: Floats) -> int:
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         difference = np.abs(steps[period:] - steps[:-period]).max()
-        # A walk that settles slowly, alternating about its limit, almost repeats after two steps, but is no cycle of two.
+        # A walk that settles slowly, alternating about its limit, almost repeats after two steps without being a cycle.
         if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0

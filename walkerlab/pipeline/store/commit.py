@@ -18,7 +18,7 @@ def commit_of_checkout(root: Path) -> str | None:
     """Return the commit of a source tree, with '-dirty' if its package files changed, or None outside a git
     checkout.
     """
-    # look only at the package's own repository: its environment may lie inside another checkout
+    # Without this check, git would report the commit of another checkout that contains the environment.
     if not (root / ".git").exists():
         return None
     commit = git(root, "rev-parse", "HEAD")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.store.content import Attribute, Group, Variable
 
-# Text by which netCDF readers recognise a dimension without a coordinate; the length follows it.
+# Text by which netCDF readers recognise a dimension without a coordinate. The length is appended.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""
@@ -132,7 +132,7 @@ def stored_bytes(values: NDArray[Any]) -> int:
 
 def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
     """Encode an array of strings as UTF-8 of one length, padded with NUL."""
-    # Not marked as UTF-8, because Octave loads only text that is marked as ASCII, and stops at any other.
+    # The type is not marked as UTF-8, because Octave stops at any text that is not marked as ASCII.
     texts = [text.encode() for text in values.ravel().tolist()]
     return np.array(texts, f"S{text_bytes(values)}").reshape(values.shape)
 
@@ -158,7 +158,7 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
 
 
 class Budget:
-    """Number of bytes that the datasets not yet read may declare. A file may not declare more than it holds."""
+    """Number of bytes that the remaining datasets may declare, since a file cannot hold more data than its size."""
 
     def __init__(self, size: int) -> None:
         """Set the budget to the size of the file, in bytes."""
@@ -202,7 +202,7 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Map members' addresses to their names, since HDF5 would search the whole file for the name of a scale."""
+    """Return names by address in the file. HDF5 itself would search the whole file for the name of a scale."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
@@ -245,7 +245,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     if h5py.check_string_dtype(dataset.dtype).length is None:
         return read_variable_strings(dataset, budget)
     texts = np.asarray(dataset[()])
-    # Equal strings share one object, because a short string takes far more memory than in the file.
+    # Equal strings share one object, because a short string takes far more memory here than in the file.
     decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
     values = np.empty(texts.shape, dtype=object)
     values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]

@@ -29,7 +29,7 @@ Labels = Mapping[str, tuple[str, str]]
 
 OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of caches of stage inputs (see `input_cache`) that a process keeps."""
+"""Number of caches of stage inputs that a process keeps, see `input_cache`."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -58,9 +58,7 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def input_cache(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
-    """Return the cache of stage inputs of this process, which is kept between chunks. Arguments are as in
-    `compute_point`.
-    """
+    """Return this process's cache of stage inputs, which outlives a chunk. Arguments are as in `compute_point`."""
     return MemoryResults(graph)
 
 
@@ -155,13 +153,13 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 
     Raises StorageError if that fails.
     """
-    # A point that failed is tried again in the next run.
+    # Failed points are not stored, so that the next run tries them again.
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
     points = rows_group(rows, labels_of(PointResult), "point", "point of the chunk")
     content = Content({"points": points}, {"labels": {name: list(label) for name, label in chunk.labels.items()}})
-    # Chunks of equal points have the same name, so a repeated one replaces the old file.
+    # Chunks of the same points have the same name, so that a repeated chunk replaces the old file.
     inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
     name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)

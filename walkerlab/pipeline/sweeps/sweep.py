@@ -115,7 +115,7 @@ class SweepRun:
         unique, self.inverse = np.unique(keys, return_inverse=True)
         # NumPy drops zero bytes at the end of a byte string.
         self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
-        # index of the first point with each key
+        # By key: index of the first point that has it.
         self.first = np.full(len(unique), len(keys))
         # `minimum.at` also counts repeated indices, unlike an assignment to them.
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
@@ -232,7 +232,7 @@ class SweepRun:
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
-                place = bug.rpartition("\n  ")[0]  # leave out the message, which differs from point to point
+                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
                 if place not in bugs:
                     reporter.warn(f"a bug stopped one point of the sweep; the others continue.\n{bug}")
                     bugs[place] = bug
@@ -253,7 +253,7 @@ class SweepRun:
         """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
         stage = self.question.stage
         graph = self.keys.graph
-        # Workers keep inputs between chunks. The token keeps those of earlier sweeps out of a forced one.
+        # Workers keep inputs between chunks. With a new token, a forced sweep does not reuse those of earlier sweeps.
         forced = token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
