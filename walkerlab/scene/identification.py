@@ -278,7 +278,15 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     walks = step_map_of(subject, family, measured.first_leg)
     z = gait_start(subject, family, measured.first_leg)
     directions = felt_directions(walks, z, family.start)
-    forecast = Forecast(walks, family.admits, family.scales(), z, directions, measured, question.sensors)
+    forecast = Forecast(
+        measured=measured,
+        nuisances=question.sensors,
+        walks=walks,
+        admits=family.admits,
+        scales=family.scales(),
+        z=z,
+        directions=directions,
+    )
     bounds = [question.fit.get(key) or UNBOUNDED for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
     leg_m = subject.config.walker.leg_length_m

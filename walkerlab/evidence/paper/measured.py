@@ -17,7 +17,7 @@ from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config, Equations
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.evidence.paper.appendix_a import RigidWalker, assembled, step_length
-from walkerlab.evidence.paper.printed import X_P, adams_start_as_printed, slope_of
+from walkerlab.evidence.paper.printed import STATE_NAMES, X_P, adams_start_as_printed, slope_of
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.walker import ContactWalker
@@ -166,6 +166,27 @@ class Measured:
     contact: ContactMeasurements
     errors: Errors
     departures: Departures
+
+    @property
+    def raised(self) -> list[float | None]:
+        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
+        gait = self.models.get(self.equations)
+        start = self.contact.start
+        if gait is None or start is None:
+            return [None] * len(STATE_NAMES)
+        pairs = zip(start, gait.state, strict=True)
+        return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
+
+    @property
+    def speed_differences(self) -> dict[str, float]:
+        """Difference (%) of the contact model's average velocity from the rigid model's, by set of equations."""
+        contact = self.contact.table_3.v_com
+        speeds = {name: model.table_3.v_com for name, model in self.models.items()}
+        return {
+            name: 100.0 * abs(contact - rigid) / abs(rigid)
+            for name, rigid in speeds.items()
+            if rigid and contact is not None
+        }
 
 
 CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)

@@ -102,16 +102,6 @@ class Judge:
         about = {"where": entry.where, "quantity": entry.quantity, "unit": entry.unit}
         return Judged(entry, about, {**values, "contact": contact}, verdict, evidence)
 
-    @property
-    def raised(self) -> list[float | None]:
-        """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
-        gait = self.measured.models.get(self.measured.equations)
-        start = self.measured.contact.start
-        if gait is None or start is None:
-            return [None] * len(printed.STATE_NAMES)
-        pairs = zip(start, gait.state, strict=True)
-        return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
-
     def judge_input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
         """Judge a parameter of both models, or of the contact model alone."""
         rigid: dict[str, float] = dict.fromkeys(EQUATION_SETS, value) if scene == "rigid" else {}
@@ -144,15 +134,15 @@ class Judge:
         entry = row.percent
         verdict = verdict_on(entry, [row.percent_of_matlab], Verdict.EXPLAINED)
         left_open = None if entry in contradictions() else percent_left_open(row)
-        text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
-        return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
+        text = prose("evidence.percent", row, left_open, self.measured.contact, self.measured.raised[2:])
+        return self.row(entry, {}, self.measured.raised[coordinate], verdict, "any", text)
 
     def adams_start(self, entry: Printed, coordinate: int) -> Judged:
         """Judge a coordinate of the ADAMS start, which is an input if the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
         verdict = Verdict.INPUT if entry.fits(value) else Verdict.NOT_REPRODUCED
-        text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.raised[2:])
+        text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.measured.raised[2:])
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> Judged:
@@ -194,13 +184,7 @@ class Judge:
     def velocity_difference(self) -> Judged:
         """Judge the difference of the average velocities. The evidence includes the paper's own arithmetic."""
         entry = printed.VELOCITY_DIFFERENCE
-        contact = self.measured.contact.table_3.v_com
-        speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
-        percentages = {
-            name: 100.0 * abs(contact - rigid) / abs(rigid)
-            for name, rigid in speeds.items()
-            if rigid and contact is not None
-        }
+        percentages = self.measured.speed_differences
         left = printed.T_LEFT
         right = printed.T_RIGHT
         cycle = printed.T_CYCLE

@@ -73,33 +73,17 @@ class Prediction(NamedTuple):
     angles_rad: Floats  # (samples, 2) predicted angles without the sensors' offset and gain
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
-    """Function from unknowns to predicted values.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Readings:
+    """The measured values of a walk, and how clock and sensors would show a predicted one.
 
-    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each divided by its scale.
     If `in_phase`, angles are compared at fractions of each step, so that fits converge from a poor first guess; if not,
     at their sample times, which do not depend on measured heel strikes, and periods do not count as measured values.
     """
 
-    walks: WalkMap
-    admits: Callable[[tuple[float, ...]], bool]  # whether parameters give a valid walker
-    scales: Floats  # (parameters,) typical changes
-    z: Floats  # (d,) section coordinates around which the start is searched for
-    directions: Floats  # (d, starts) directions of the start that affect the next step
     measured: MeasuredWalk
-    nuisances: tuple[str, ...] = ()
+    nuisances: tuple[str, ...] = ()  # properties of clock and sensors that are estimated
     in_phase: bool = True  # whether angles are compared at fractions of each step rather than at their sample times
-    kicked: bool = False  # whether kicks disturb the walk besides the floor's heights
-
-    @property
-    def unknowns(self) -> int:
-        return int(self.scales.size + self.directions.shape[1] + len(self.nuisances))
-
-    @property
-    def heights(self) -> int:
-        """Number of footholds, with one more for angles at sample times, in case predicted steps are shorter."""
-        return self.measured.count + (1 if self.in_phase else 2)
 
     @cached_property
     def channels(self) -> dict[str, Floats]:
@@ -131,12 +115,71 @@ class Forecast:
         half = 2 * self.measured.step + (self.measured.phase >= 0.5)
         return np.unique(2 * half[:, None] + [0, 1], return_inverse=True)[1].ravel()
 
+    def sensors(self, u: Floats) -> dict[str, float]:
+        """Return the properties of clock and sensors at unknowns u, of which the last are the nuisances."""
+        estimated = dict(zip(self.nuisances, u[u.size - len(self.nuisances) :], strict=True))
+        return {name: value + estimated.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
+
+    def step_values(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
+        """Return each channel's values (steps,) in a walk, or their derivatives (steps, columns)."""
+        values = {
+            STEP_PERIOD: walk.durations_s * sensors[CLOCK],
+            STEP_LENGTH: walk.lengths_m,
+            LEG_ANGLE: walk.angles_rad,
+        }
+        return [values[name][: self.measured.count] for name in self.channels]
+
+    def sample_times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
+        touches = np.append(0.0, np.cumsum(walk.durations_s))
+        step = self.measured.step
+        times = self.measured_times() / sensors[CLOCK]
+        if self.in_phase:
+            times = touches[step] + self.measured.phase * walk.durations_s[step]
+        times = times + sensors[DELAY]
+        last = touches[-1] * (1.0 - LAST_INSTANT)
+        return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
+
+    def measured_times(self) -> Floats:
+        """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
+        touches = np.append(0.0, np.cumsum(self.measured.periods_s))
+        step = self.measured.step
+        return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])
+
+    def sample_time_changes(self, durations: Floats) -> Floats:
+        """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
+        if not self.in_phase:
+            return np.zeros((self.measured.step.size, durations.shape[1]))
+        touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))
+        step = self.measured.step
+        return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Forecast(Readings):
+    """Function from unknowns to predicted values.
+
+    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each divided by its scale.
+    """
+
+    walks: WalkMap
+    admits: Callable[[tuple[float, ...]], bool]  # whether parameters give a valid walker
+    scales: Floats  # (parameters,) typical changes
+    z: Floats  # (d,) section coordinates around which the start is searched for
+    directions: Floats  # (d, starts) directions of the start that affect the next step
+    kicked: bool = False  # whether kicks disturb the walk besides the floor's heights
+
+    @property
+    def unknowns(self) -> int:
+        return int(self.scales.size + self.directions.shape[1] + len(self.nuisances))
+
+    @property
+    def heights(self) -> int:
+        """Number of footholds, with one more for angles at sample times, in case predicted steps are shorter."""
+        return self.measured.count + (1 if self.in_phase else 2)
+
     def parameters(self, u: Floats) -> tuple[float, ...]:
         return tuple((u[: self.scales.size] * self.scales).tolist())
-
-    def sensors(self, u: Floats) -> dict[str, float]:
-        estimated = dict(zip(self.nuisances, u[self.unknowns - len(self.nuisances) :], strict=True))
-        return {name: value + estimated.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
     def start(self, u: Floats) -> Floats:
         return self.walks.rest_on_ground(self._unsettled(u), self.parameters(u))
@@ -173,9 +216,9 @@ class Forecast:
         walk = self.walks.take_disturbed_walk(z, p, heights_m)
         if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
-        times, inside = self._times(walk, sensors)
+        times, inside = self.sample_times(walk, sensors)
         angles = self.walks.sample_legs(z, p, heights_m, times) if times.size else np.zeros((0, 2))
-        values = np.concatenate((*self._step_values(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
+        values = np.concatenate((*self.step_values(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
         return Prediction(values, walk, times, inside, angles)
 
     def differentiate(
@@ -213,32 +256,6 @@ class Forecast:
         ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
 
-    def _step_values(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
-        """Return each channel's values (steps,) in a walk, or their derivatives (steps, columns)."""
-        values = {
-            STEP_PERIOD: walk.durations_s * sensors[CLOCK],
-            STEP_LENGTH: walk.lengths_m,
-            LEG_ANGLE: walk.angles_rad,
-        }
-        return [values[name][: self.measured.count] for name in self.channels]
-
-    def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
-        touches = np.append(0.0, np.cumsum(walk.durations_s))
-        step = self.measured.step
-        times = self._measured_times() / sensors[CLOCK]
-        if self.in_phase:
-            times = touches[step] + self.measured.phase * walk.durations_s[step]
-        times = times + sensors[DELAY]
-        last = touches[-1] * (1.0 - LAST_INSTANT)
-        return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
-
-    def _measured_times(self) -> Floats:
-        """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
-        touches = np.append(0.0, np.cumsum(self.measured.periods_s))
-        step = self.measured.step
-        return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])
-
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
     ) -> tuple[Floats, Floats] | None:
@@ -258,12 +275,13 @@ class Forecast:
         count = self.measured.count
         # A sample outside the walk is taken at its nearest end, whatever its time.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
-        moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
-        moves = np.concatenate(
-            (*self._step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1]))
+        moving = (
+            varied.samples_rad * sensors[GAIN]
+            + rates[:, None] * self.sample_time_changes(varied.durations_s)[:, :, None]
         )
+        moves = np.concatenate((*self.step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))
         # The model's time of a sample is its measured time divided by the clock's rate.
-        clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
+        clock = 0.0 if self.in_phase else -self.measured_times()[:, None] / sensors[CLOCK] ** 2
         by_name = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))
         for column, name in zip(by_sensor.T, self.nuisances, strict=True):
@@ -272,14 +290,6 @@ class Forecast:
                 column[:count] = walk.durations_s[:count]
             column *= NUISANCES[name][1]
         return moves, by_sensor
-
-    def _drift(self, durations: Floats) -> Floats:
-        """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
-        if not self.in_phase:
-            return np.zeros((self.measured.step.size, durations.shape[1]))
-        touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))
-        step = self.measured.step
-        return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
 
 
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:

@@ -111,7 +111,7 @@ class SweepRun:
         self.folder = folder
         self.loaded = loaded
         self.keys = Keys(graph)
-        keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
+        keys = np.frombuffer(b"".join(checked_keys(self)), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
         # NumPy drops zero bytes at the end of a byte string.
         self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
@@ -128,28 +128,6 @@ class SweepRun:
     def config(self, index: int) -> Config:
         """Build the config of one point, on demand because a sweep may have a million points."""
         return self.loaded.variant(self.question.settings(index))
-
-    def checked_keys(self) -> list[bytes]:
-        """Return the stage key of every point (32 bytes each), in order.
-
-        Raises ConfigError that names invalid points with their values, one point for each reason.
-        """
-        keys: list[bytes] = []
-        problems: dict[str, str] = {}
-        for index in range(len(self.question)):
-            try:
-                keys.append(
-                    bytes.fromhex(self.keys.compute_keys(self.config(index), self.question.stage)[self.question.stage])
-                )
-            except ConfigError as error:
-                prefix = f"at {self.question.describe_point(index)}: " if len(self.question.axes) > 1 else ""
-                problems.setdefault(error.message, f"{prefix}{error.message}")
-                if len(problems) == SHOWN_PROBLEMS:
-                    problems["more"] = "and perhaps more"
-                    break
-        if problems:
-            raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
-        return keys
 
     def foresee(self, workers: int, max_points: int) -> Foreseen:
         """Return the plan without changing a file.
@@ -262,6 +240,28 @@ class SweepRun:
             yield WorkUnit(
                 key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced, versions())
             )
+
+
+def checked_keys(run: SweepRun) -> list[bytes]:
+    """Return the stage key of every point (32 bytes each), in order.
+
+    Raises ConfigError that names invalid points with their values, one point for each reason.
+    """
+    question = run.question
+    keys: list[bytes] = []
+    problems: dict[str, str] = {}
+    for index in range(len(question)):
+        try:
+            keys.append(bytes.fromhex(run.keys.compute_keys(run.config(index), question.stage)[question.stage]))
+        except ConfigError as error:
+            prefix = f"at {question.describe_point(index)}: " if len(question.axes) > 1 else ""
+            problems.setdefault(error.message, f"{prefix}{error.message}")
+            if len(problems) == SHOWN_PROBLEMS:
+                problems["more"] = "and perhaps more"
+                break
+    if problems:
+        raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
+    return keys
 
 
 def unread_keys(run: SweepRun) -> Iterator[str]:

@@ -215,20 +215,26 @@ class RuleFollower:
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t
-            stance = self.walk_state.progress.stance
-            far = contact_state.farthest_slide(ground.terrain)
-            if inside[stance] and abs(now[stance].along - self.walk_state.foothold[stance]) > far:
-                y = tuple(self.scene.about_centre(q, v).tolist())
-                # A round foot also moves away from its foothold as it rolls. Only the way of its material is sliding.
-                material = contact_state.material_along(self.scene.ours.whole, stance, now[stance].along, y)
-                if abs(material - self.walk_state.touched[stance]) > far:
-                    self._end(Outcome.SLID)
+            stance = int(self.walk_state.progress.stance)
+            if inside[stance] and has_slid(self.scene, self.walk_state, stance, now[stance].along, q, v):
+                self._end(Outcome.SLID)
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(Outcome.LIFTED_OFF)
         if q[1] < FALLEN_HIP * ground.frame.leg_length:
             self._end(Outcome.FELL)
         elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(Outcome.NO_HEEL_STRIKE)
+
+
+def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float, q: Floats, v: Floats) -> bool:
+    """Whether a foot on the ground at `along` (m) has slid too far from its foothold."""
+    far = contact_state.farthest_slide(scene.ground.terrain)
+    if abs(along - walk_state.foothold[foot]) <= far:
+        return False
+    # A round foot also moves away from its foothold as it rolls. Only the way of its material is sliding.
+    y = tuple(scene.about_centre(q, v).tolist())
+    material = contact_state.material_along(scene.ours.whole, foot, along, y)
+    return bool(abs(material - walk_state.touched[foot]) > far)
 
 
 def edges_under(terrain: Terrain, foot: int, cell: int) -> tuple[float, float]:
