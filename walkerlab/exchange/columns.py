@@ -68,7 +68,7 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)  # reason, by quantity, why its column is not used
+    left_out: dict[str, str] = field(default_factory=dict)  # by quantity: why its column is not used
     walks: str = ""  # stated direction of the walk; '' to find it
     unit_is_stated: bool = True  # whether the file or the user states the unit of the leg angles explicitly
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
@@ -104,7 +104,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
     recording, notes = set_frame_times(recording, asked)
-    # A stated unit of time is that of the file's times, which the frame rate has replaced.
+    # The frame rate has replaced the times of the file, so a unit stated for them does not apply.
     if FRAME_TIME in recording.columns:
         units = {name: unit for name, unit in units.items() if name != TIME}
     named = find_named(recording, asked)
@@ -120,13 +120,13 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     for pairs in ends.values():
         columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
-    # Lines are left out here, because their markers are examined one by one (see `body_gaps`).
+    # Frozen markers of lines are found later, marker by marker, see `body_gaps`.
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
     # A fault in a column that every walk needs, or that the user names, is an error. Other columns are only left out.
     needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
     time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
     rows = select_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
-    rows, cut, gaps = remove_gaps(recording, needed, rows)
+    rows, cut, gaps = rows_without_gaps(recording, needed, rows)
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
     values = {}
@@ -148,7 +148,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     used = {name: sources[name] for name in (TIME, *values, *lines)}
-    # Messages name samples by their numbers in the file, however many are left out from here on.
+    # Samples may be left out from here on, but messages name them by their numbers in the file.
     values[SAMPLE] = np.asarray(1.0 + np.flatnonzero(rows))
     tilt, tilt_notes = camera_tilt(recording, asked, slope_rad)
     walk = RecordedWalk(
@@ -187,7 +187,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
     elif intervals.size and (typical := float(np.median(intervals))) > 0.0:
-        # Where the file leaves out frames, its times are farther apart, so rounding still counts them.
+        # If the file leaves out frames, times are farther apart. Rounding counts the missing frames, too.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
         if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
@@ -255,7 +255,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
     """Return the forward lean (rad) of the direction from which angles are measured, and notes about it."""
     tilt = asked.camera_tilt_deg
     if tilt is None and recording.levelled_by:
-        # In tables of angles the floor's angle is added to the values instead (see `floor_in_column`).
+        # In tables of angles, the angle of the floor is added to the values instead, see `floor_in_column`.
         return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
             f"{recording.levelled_by} levels the floor, so angles are taken from the floor's normal: state "
             "--camera-tilt 0 if its floor_angle was 0."
@@ -316,13 +316,13 @@ def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
 
 
 def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
-    """Mark the samples in the requested part of the recording.
+    """Find the samples in the requested part of the recording.
 
     Raises ConfigError if there are none.
     """
     begin = -math.inf if asked.from_s is None else asked.from_s
     end = math.inf if asked.to_s is None else asked.to_s
-    # Samples without a time are neither before nor after the part, so they remain and are reported as gaps.
+    # Written as a negation, so that samples without a time remain and are reported as gaps.
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
@@ -333,10 +333,10 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     return np.asarray(rows)
 
 
-def remove_gaps(
+def rows_without_gaps(
     recording: Recording, sources: Iterable[str], rows: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], str, str]:
-    """Mark the rows without gaps in any source. Also describes the samples cut off at the ends, and the gaps within.
+    """Find the rows in which no source has a gap. Also describe the samples cut off at the ends, and the gaps between.
 
     Raises ConfigError for a column that does not contain numbers, and if every sample has a gap.
     """
@@ -412,7 +412,7 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
     columns = {column: normalise_name(column) for column in recording.columns}
     by_ending: dict[str, list[str]] = {}
     for column, name in columns.items():
-        # ADAMS puts names of objects before that of a quantity, separated by dots, and OpenSim by slashes.
+        # Names of objects precede that of a quantity. ADAMS separates them by dots, OpenSim by slashes.
         for start in (0, *(match.end() for match in re.finditer(r"[./]", name))):
             by_ending.setdefault(name[start:], []).append(column)
     sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
@@ -482,7 +482,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
 
 
 def named_column(recording: Recording, name: str) -> str:
-    """Return the column that a user names. The unit in brackets, which the header may have, can be left out."""
+    """Return the column that a user names, with or without the unit in brackets that its header may have."""
     name = name.strip()
     return name if name in recording.columns else UNIT_IN_NAME.sub("", name)
 
@@ -555,7 +555,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
 
 
 def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
-    """Raise ConfigError if a unit is stated for something unknown, or is of another kind."""
+    """Raise ConfigError if a unit is stated for something unknown or for a quantity of another kind."""
     for name, unit in units.items():
         if name not in (*UNIT_VALUES, *quantities, *recording.columns):
             near = get_close_matches(name, (*UNIT_VALUES, *quantities, *recording.columns), 1)

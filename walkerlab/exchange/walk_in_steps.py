@@ -34,7 +34,7 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-# An angle is that of a shank if its backward maximum is this many times its value at heel strikes.
+# An angle that reaches backwards this many times as far as at heel strikes is that of a shank.
 SHANK_SWING_RATIO: Final = 1.4
 WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
@@ -42,22 +42,22 @@ INTERVALS: Final = 24  # largest number of knot intervals of the spline through 
 MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
 LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
-"""Shortest and longest plausible step, in s or m; values outside are damaged or in another unit."""
+"""Shortest and longest plausible step, in s or m. Other values are damaged or in another unit."""
 NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
 SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
 LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
 FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
-SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
-SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for the tilt begins
+SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
+SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
 """Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
-FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging legs from which a doubt is raised
-NOISE_IN_CLOCK: Final = 7.0  # how much that limit grows with the scatter of the angles, relative to their own
+FAR_CLOCK: Final = 1.15  # a doubt is raised if the clock runs faster or slower than the swinging legs by this factor
+NOISE_IN_CLOCK: Final = 7.0  # the limit grows by this multiple of the scatter of the angles, relative to the angles
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-COARSE: Final = 0.2  # largest spacing of recorded values, as a fraction of an error that they can show
+COARSE: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
 CONSTANT: Final = 0.25  # an error is constant if its scatter over a step is at most this fraction of it
 SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
@@ -65,9 +65,9 @@ SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, a
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """Recorded walk from its first heel strike on. Column 0 is the leg that swings first."""
+    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 is the leg that swings first."""
 
-    time_s: Array  # (samples,) s, from that heel strike; every later heel strike has a sample on each side
+    time_s: Array  # (samples,) s, from the first heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
@@ -76,7 +76,7 @@ class RecordedSteps:
     length_m: Array  # (steps,)
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
-    origin_s: float  # the recording's time at the first heel strike
+    origin_s: float  # time of the recording at the first heel strike
     doubts: tuple[str, ...]  # oddities of the heel strikes
 
 
@@ -99,7 +99,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
     if model.legs_differ and len(touches) > 1 and touches[1].leg == 1:
-        touches = touches[1:]  # as in computed walks, leg 1 swings first
+        touches = touches[1:]  # leg 1 must swing first, as in computed walks
     if len(touches) < 2:
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
@@ -115,12 +115,12 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    # Energy jumps at heel strikes, so the clock's rate can be seen only if these are certain.
+    # Energy jumps at heel strikes. If their times are uncertain, nothing can be said about the clock.
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
 def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
-    """Return the vectors (samples,) in m from the hip over leg 0's foot centre to that over leg 1's, normal + i along.
+    """Return the vectors (samples,) in m from the hip over the foot centre of leg 0 to that of leg 1, normal + i along.
 
     angles  (samples, 2) of straight legs, from the vertical
     """
@@ -132,7 +132,7 @@ def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
 
 
 def rise_of_soles(model: RigidModel) -> float:
-    """Return the radius of leg 1's foot minus that of leg 0's (m). Leg 0 stands in the exchanged model."""
+    """Return the foot radius of leg 1 minus that of leg 0 (m). Leg 0 stands in the exchanged model."""
     return float(model.radius - model.exchanged.radius)
 
 
@@ -157,7 +157,8 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # The search begins away from the likely sum, because a small shift is within its error.
+        # The search begins away from the likely sum. The shift from there to the jumps of the rates is larger than its
+        # error. A smaller one would count as no shift, and the rough sum would remain.
         return np.asarray((total(angles) - sum_rad - SEARCH_OFFSET_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -173,7 +174,7 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
     way = walk.belt_m_s * float(steps.touch_time_s[-1])
     if walk.hip_is_in_m:
         ends = steps.origin_s + np.array([0.0, steps.touch_time_s[-1]])
-        # The walker may drift along the belt while it walks.
+        # The walker may drift along the treadmill, which adds to the distance.
         way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
     share = way / float(steps.length_m.sum())
     doubts = steps.doubts
@@ -208,7 +209,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     sizes = np.bincount(steps.step)
     means = np.add.reduceat(columns, np.cumsum(sizes) - sizes) / sizes[:, None]
     columns -= means[steps.step]
-    # A tilt turns gravity. The two coefficients are its components, so together they give its size.
+    # The two coefficients are the components of gravity in the tilted axes, so together they give its magnitude.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
     far = FAR_CLOCK + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
@@ -224,7 +225,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
 def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
     """Return angles (rad) and rates (rad/s) of both legs (samples, 2), of a polynomial through each step.
 
-    Rates of a spline would contain so much noise that kinetic energies were too large.
+    Rates of a spline contain more noise, which would make kinetic energies too large.
     """
     angles = np.empty_like(steps.angle_rad)
     rates = np.empty_like(steps.angle_rad)
@@ -239,7 +240,7 @@ def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
-    """Return the longest sequence of heel strikes of alternate legs, and a sentence about those left out."""
+    """Return the longest sequence of heel strikes of alternate legs, and sentences about the others."""
     walks: list[list[Touch]] = [[]]
     breaks = []
     for touch in touches:
@@ -259,7 +260,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
     for leg, name in enumerate(("angle 1", "angle 2")):
         if not (model, model.exchanged)[leg].kneed:
             continue
-        # A percentile, because the minimum may be an outlier.
+        # The minimum itself may be an outlier.
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -280,7 +281,7 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Disagreement between two signs of a heel strike: leg rates that jump, and feet that are level."""
+    """Disagreement between the two signs of a heel strike: jumps of the leg rates, and level feet."""
 
     shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
     sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
@@ -327,7 +328,7 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
     if not courses[0] or not courses[1]:
         return None
     swing, stance = (np.mean(courses[0], axis=0)[k] - np.mean(courses[1], axis=0)[k] for k in (0, 1))
-    # Leg 1 stands while leg 0 swings, so the stance legs show the constant with the opposite sign.
+    # The stance leg is the other one, so it shows the constant with the opposite sign.
     differences = np.array([swing, -stance])
     constant = float(np.mean(differences))
     return constant if float(np.std(differences)) < CONSTANT * abs(constant) else None
@@ -336,9 +337,9 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
 def offset_doubts(
     time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Describe rates that jump before or after the feet are level, and alternating steps, with the error behind them.
+    """Describe jumps of the rates while the feet are not level, and alternating steps, with the error behind them.
 
-    An error of the angles is the explanation if both disappear once it is subtracted.
+    A constant error of the angles explains them if both disappear once it is subtracted.
     """
     before = mismatch(time, angle, touches, model, touch_sum_rad)
     alternate = bool(before.lengths_m) and before.between_rad is not None
@@ -394,7 +395,7 @@ def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
-    # With a spring at the hip, a leg swings faster than it would hang, so there is no limit.
+    # With a spring at the hip, a leg may swing much faster than a hanging pendulum, so there is no limit.
     swing_s = math.pi * math.sqrt(model.A[SWING, SWING] / weight) if weight and not model.sprung else 0.0
     if step_s < SHORTEST_STEP * swing_s:
         raise ConfigError(
@@ -452,13 +453,13 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     velocity = walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin
-    # A step ends just before its heel strike, because a sample at the strike begins the next step.
+    # The sample at a strike begins the next step, so the last sample of a step lies just before it.
     side = SIDE * float(times[-1])
     spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
-    # A spline is least certain at its ends, where the fits of the heel strikes are better.
+    # At the ends of a step, the fits of the heel strikes are more accurate than the spline.
     for number, (_, angles, velocities) in enumerate(pieces):
         for row, touch, rates in end_fits(touches, number):
             angles[row] = touch.fit.angle[order]
@@ -466,7 +467,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
                 velocities[row] = rates[order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    lengths = lengths_of(model.exchanged if swapped else model, angles_rad, step, len(times))
+    lengths = lengths_from_angles(model.exchanged if swapped else model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
     errors = np.array([touch.error_s for touch in touches])
     return RecordedSteps(
@@ -501,7 +502,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
-    # Recorded values stay as they are. The spline serves only for the ends and for velocities.
+    # The spline is used only for the ends and for velocities. All other values stay as recorded.
     values[1:-1] = columns[inside]
     velocities = spline.derivative()(grid)[:, :2] if columns.shape[1] == 2 else values[:, 2:]
     return grid, values[:, :2], velocities
@@ -509,7 +510,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
 def spline_through(time: Array, columns: Array) -> BSpline:
     """Fit a spline with evenly spaced knots, with fewer knots if there are few samples."""
-    # Imported here, because checking whether a result is up to date needs no fit.
+    # Imported here, because it is not needed to check whether a result is up to date.
     from scipy.interpolate import make_lsq_spline
 
     degree = min(SPLINE_DEGREE, time.size - 1)
@@ -519,10 +520,10 @@ def spline_through(time: Array, columns: Array) -> BSpline:
     return make_lsq_spline(time, columns, knots, degree)
 
 
-def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
+def lengths_from_angles(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
     """Return the step lengths (m) from the leg angles at the beginning and end of each step.
 
-    model  the one of the first step
+    model  rigid model whose swing leg is that of the first step
     """
     n = len(model.arm_x)
     states = np.zeros((2, count, 2 * n))
