@@ -136,7 +136,7 @@ class Strike:
         return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
 
     def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
-        """Return the samples (first, end) that are farther from the ends than `part` of a step. Other fits cover others.
+        """Return the samples (first, end) farther from the ends than `part` of a step. Other fits cover the rest.
 
         whole  whether to go up to an end of the recording
         """

@@ -248,7 +248,7 @@ def best_degree(fits: Fits) -> int:
 
 
 def add_bias(fit: StrikeFit, narrow: StrikeFit | None, wide: StrikeFit | None) -> StrikeFit:
-    """Return a fit whose error includes its bias, which is estimated by the change from a `narrow` to a `wide` fit."""
+    """Return a fit whose error includes its bias: the change from the `narrow` fit to the `wide` one, one degree up."""
     change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 

@@ -567,7 +567,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. If it is a length or inertia of zero, return 1 % of that of a leg. Drives stay zero."""
+    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg. Other zeros stay."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
