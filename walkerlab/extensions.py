@@ -1,6 +1,6 @@
 """Extensions: packages that add stages, figures, sections of the page, answers, laws and studies.
 
-The package's own extensions are listed in `walkerlab.EXTENSIONS`; other packages announce theirs by entry points of the
+The built-in extensions are listed in `walkerlab.EXTENSIONS`. Other packages announce theirs by entry points of the
 group `walkerlab.extensions`. An extension names its code in quotes, "module:name", which is imported on first use. All
 other modules ask this one for what extensions add, so none of them names a module of a higher layer.
 """
@@ -95,7 +95,7 @@ class Found:
 
     name: str
     code: str  # module:name
-    source: str  # distribution and version; empty for the package's own
+    source: str  # distribution and version; empty for built-in extensions
     extension: Extension | None = None  # None if it is left out
     reason: str = ""  # reason why it is left out
 
@@ -229,7 +229,7 @@ def versions() -> str:
 
 
 def refuse_other_versions(expected: str) -> None:
-    """Raise ConfigError in a worker if the `versions` of its caller differ from its own."""
+    """Raise ConfigError in a worker if its extensions differ from those of the caller, `expected` (see `versions`)."""
     if expected != versions():
         have = f"this worker has the extensions [{versions()}], and its caller [{expected}]."
         raise ConfigError(have, "Install the same in both environments; `walkerlab extensions` lists them.")

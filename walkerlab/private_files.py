@@ -32,7 +32,7 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder with its content, to other users. Delete and return everything they may have written.
+    """Close a file, or a folder and everything in it, to other users. Delete and return what they may have written.
 
     Raises OSError if such a file cannot be deleted.
     """

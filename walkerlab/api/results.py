@@ -38,7 +38,7 @@ Setting: TypeAlias = "Value | Block | NDArray[np.generic] | np.generic | Sequenc
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """Result of a stage. Its repr shows the headline values, and notebooks show its answer with tables.
+    """Result of a stage. `repr` shows the headline values, and notebooks show the answer with tables.
 
     Each value of the summary is also an attribute and an item.
 
@@ -148,7 +148,7 @@ class Result:
     def to_dataframe(self, group: str = "") -> DataFrame:
         """Return a group of arrays, by default the first, as a pandas DataFrame. `attrs["units"]` has units by column.
 
-        Its index is made of the dimensions that all arrays share; others give columns such as `angle.1`.
+        The index is made of the dimensions that all arrays share. Other dimensions give columns such as `angle.1`.
 
         Raises KeyError for an unknown group, ConfigError if pandas is not installed.
 

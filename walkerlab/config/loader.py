@@ -25,13 +25,13 @@ from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
 IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
-"""Steeper than any slope on which passive walkers are known to walk; a larger value is perhaps in degrees."""
+"""Steeper than any slope on which passive walkers are known to walk. A larger value is perhaps in degrees."""
 IMPLAUSIBLE_LENGTH_M: Final = 20.0
-"""Longer than the legs of any real walker; a larger value is perhaps in millimetres."""
+"""Longer than the legs of any real walker. A larger value is perhaps in millimetres."""
 IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
-"""Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
+"""Stronger than the gravity of any planet in the solar system. A larger value is perhaps in cm/s^2."""
 WATER_KG_M3: Final = 1000.0
-"""Density of water; a mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
+"""Density of water. A mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ def _word(value: Any) -> str:
 def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> Config:
     """Build the paper config with changes. `lines` are nested keys with values, whose `source` error messages name.
 
-    Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
+    A start is moved onto its constraints without a warning. Raises ConfigError if the result is invalid.
     """
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
@@ -234,7 +234,7 @@ def paper_config_with_tree(upper: BlockNode) -> Config:
 
     Raises ConfigError with positions if the result is invalid.
     """
-    # With SI units, keys missing in the contact block keep the paper's physical value, not its number in N, mm, s.
+    # With SI units, missing keys of the contact block keep the physical values of the paper, not the numbers.
     layers = files.read_layers(files.builtin_config(files.DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, BlockNode) else None

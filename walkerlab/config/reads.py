@@ -164,7 +164,7 @@ class OwnCases(Protocol):
 
 
 class CompassCasesConfig(Protocol):
-    """Keys that `stability` reads for the paper's compass. Its cases are variations of the paper's config."""
+    """Keys that `stability` reads for the compass of the paper. The cases are variations of the paper's config."""
 
     @property
     def walker(self) -> Walker: ...
@@ -175,7 +175,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for a walker other than the paper's. Its extreme cases vary its own scene."""
+    """Keys that `stability` reads for a walker other than the paper's. Its scene is varied by the extreme cases."""
 
     @property
     def stability(self) -> OwnCases: ...

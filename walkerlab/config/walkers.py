@@ -349,7 +349,7 @@ class Kneed(_Legged):
 
 
 class PartBody(Block):
-    """A rigid body, whose own frame is upright when the walker stands upright."""
+    """A rigid body. Its frame is upright when the walker stands upright."""
 
     name: str = name_key("name of the body")
     mass_kg: float = mass(..., "its mass", least=0.0)
@@ -469,7 +469,7 @@ def hip_to_sole(
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
-    below, upper = 0.0, 0.0  # m: depth of the body's upper hinge below the hip, and its height above the body's origin
+    below, upper = 0.0, 0.0  # m, of the body's upper hinge: depth below the hip, and height above the body's origin
     for body, lower in pairwise(chain):
         if (body, lower) not in places:
             return None

@@ -1,7 +1,7 @@
 """Walker as ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
 
-The walk takes place in the x-y plane, x along the slope and y normal to it; gravity is tilted.
-Expressions name markers and variables in braces, as in DX({leg_1.foot}); each file format inserts its own names.
+The walk takes place in the x-y plane, x along the slope and y normal to it. Gravity is tilted.
+Expressions name markers and variables in braces, as in DX({leg_1.foot}). Each file format replaces them by its names.
 """
 
 import math

@@ -102,8 +102,7 @@ class EngineScene:
 def engine_scene(
     config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
 ) -> EngineScene:
-    """Build the scene of a config, with no foot pinned and no knee locked. `pad_pitch: own` becomes the rigid step
-    length.
+    """Build the scene of a config without pinned foot or locked knees. `pad_pitch: own` becomes the rigid step length.
 
     asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
     """

@@ -85,7 +85,7 @@ UNNAMED: Mapping[int, Hinge] = {}
 def contact_settings(target: EngineContact) -> dict[str, float]:
     """Compute the settings that tune MuJoCo's contact to the target, by the formulas at the top of this module.
 
-    Exports and engines use the same settings for every foot; `foot_text` and `pair_text` turn them into a solref.
+    Exports and engines use the same settings for every foot. `foot_text` and `pair_text` turn them into a solref.
     Raises ConfigError for a target without damping.
     """
     if target.damping_ratio == 0.0:

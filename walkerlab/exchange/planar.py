@@ -23,8 +23,8 @@ SMALLEST_BALL_M = 5e-4
 class Link:
     """Rigid link, lumped from bodies that move together and the particles on them.
 
-    parent_point_m  hinge in the parent's frame (m); for the base, the world's origin
-    point_m         hinge in the link's own frame (m); for the base, the point that its freedoms move
+    parent_point_m  hinge in the frame of the parent (m); for the base, the origin of the world
+    point_m         hinge in the frame of the link (m); for the base, the point that the freedoms move
     """
 
     name: str

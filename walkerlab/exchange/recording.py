@@ -47,7 +47,7 @@ TIME_NAMES = [
 ]  # fmt: skip
 """Patterns of names of a time column. T comes last, because it may be a temperature."""
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
-"""Pattern for a unit in brackets behind a name; [2] and [:,2] count the parts of a vector."""
+"""Pattern for a unit in brackets behind a name. It excludes [2] and [:,2], which count the parts of a vector."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
@@ -131,8 +131,7 @@ class Recording:
 
 
 def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
-    """Read the columns of a file, in the format of its extension. `key` is the config key that names the file, if there
-    is one.
+    """Read the columns of a file in the format of its extension. `key` is the config key that names the file, if any.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
@@ -533,7 +532,7 @@ def read_opensim(path: Path) -> Recording:
 def angle_unit(path: Path, settings: Mapping[str, str]) -> str:
     """Return the unit of the angles in an OpenSim table as OpenSim 4.6 reads it, or '' if its header contradicts that.
 
-    Without a version a .mot file is SIMM's, in degrees; other tables are in radians unless they say inDegrees=yes.
+    A .mot file without a version is from SIMM, in degrees. Other tables are in radians unless they say inDegrees=yes.
     """
     in_degrees = settings.get("indegrees", "")
     if path.suffix.lower() == ".mot" and "version" not in settings and in_degrees != "yes":

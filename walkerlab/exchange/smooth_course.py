@@ -33,7 +33,7 @@ MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbou
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step; a longer one is a lasting jump
+LONGEST: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
 BORDER: Final = 0.1  # fraction of a step at the far end of a fit that is left to other fits
 LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
 LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
@@ -310,7 +310,7 @@ class Course:
         return first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
 
     def guess(self, indices: Iterable[int]) -> None:
-        """Add first guesses of the times at which rates jump within some spans and the spans beside them."""
+        """Add first guesses of the times at which rates jump, for some spans and their neighbours."""
         nearby = {near for index in indices for near in (index - 1, index, index + 1)}
         new = sorted(nearby.intersection(range(len(self.spans))) - self.guesses.keys())
         spans = [self.spans[index] for index in new]

@@ -1,7 +1,7 @@
 """Find the heel strikes in recorded angles.
 
 A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
-neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
+neighbouring crossings of one leg count as one strike. It is timed by the zero of the height in a smooth fit of angles:
 one polynomial before the strike and one after it, which meet at the strike, because only the rates jump. The scatter of
 the angles around the fit gives the standard error of that time.
 """
@@ -65,7 +65,7 @@ class StrikeFit:
 
 @dataclass(frozen=True)
 class Touch:
-    """Heel strike: time and its standard error (s), leg that strikes (0 or 1), speed of the foot's fall (m/s)."""
+    """Heel strike: time and standard error (s), leg that strikes (0 or 1), and speed of the falling foot (m/s)."""
 
     time_s: float
     leg: int
@@ -141,8 +141,8 @@ def merge_repeats(crossings: Sequence[tuple[float, int, float]], apart_s: float)
 def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> Touch | None:
     """Return the heel strike with which a recording begins, or None if it begins at another instant.
 
-    The first sample counts as a heel strike if the height fitted there is zero within three of its standard errors, and
-    if these are short when expressed as a time.
+    The first sample counts as a heel strike if the height fitted there is zero within three standard errors, and if the
+    standard error is short when expressed as a time.
     """
     spread = angle[:, 0] - angle[:, 1]
     begin = float(time[0])

@@ -27,7 +27,7 @@ UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     # Names are in lower case, so MJ would read as mJ. No walker has megajoules.
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip
-"""Value of each unit in SI, by kind of quantity; unit names are in lower case and singular."""
+"""Value of each unit in SI, by kind of quantity. The names of units are in lower case and singular."""
 SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 
 

@@ -43,7 +43,7 @@ MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
 LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
 """Shortest and longest plausible step, in s or m. Other values are damaged or in another unit."""
-NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
+NARROWEST_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
 SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
 LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
 FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
@@ -58,7 +58,7 @@ TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
-CONSTANT: Final = 0.25  # an error is constant if its scatter over a step is at most this fraction of it
+CONSTANT: Final = 0.25  # an error counts as constant if it scatters over a step by at most this fraction
 SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
@@ -191,7 +191,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
     Energy is constant within a step of straight legs that nothing drives. If the clock runs fast by a factor r, the
-    measured kinetic energy is too small by r^2. So the ratio of its changes to those of the potential energy gives r.
+    measured kinetic energy is too small by r^2. So the ratio of the changes of kinetic and potential energy gives r.
     The tilt of the recording, which turns gravity, is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:

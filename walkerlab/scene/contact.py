@@ -76,7 +76,7 @@ def contact_scene(
 
     rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
-    asymmetry            second minus first step length, divided by their mean; it shifts the lanes of pads
+    asymmetry            second minus first step length, divided by their mean; the lanes of pads are shifted by it
     """
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
@@ -104,11 +104,11 @@ def scene_on_pads(
     search: GaitAnswer | None = None,
     asymmetry: float = 0.0,
 ) -> ContactScene:
-    """Build the scene of a config with its pads.
+    """Build the scene of a config, pads included.
 
     search  result of an earlier search for the contact gait; None to search if necessary
 
-    Raises NoAnswer if their pitch needs a contact gait and none is found.
+    Raises NoAnswer if the pitch of the pads needs a contact gait and none is found.
     """
     pitch = None
     if wants_own_pitch(require_contact(config)):
@@ -204,8 +204,8 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
 def start_state(scene: ContactScene, rigid_state: State) -> State:
     """Convert a rigid start to a state of the contact model. The stance foot just touches the ground at along = 0.
 
-    rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
-                 dtheta_1, dtheta_2)
+    rigid_state  state of the rigid model with both feet on the slope. For a compass it is (theta_1, theta_2, dtheta_1,
+                 dtheta_2) with index 1 for the swing leg, 2 for the stance leg
 
     Position and velocity are first computed with a hinge at the ball foot's centre. Unless the foot is pinned, its
     velocity is then changed so that it rolls without slip.
@@ -268,6 +268,6 @@ def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the starts with the solver settings of a map.
 
-    evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
+    evaluations  right-hand-side evaluations for the unchanged start. The budget of a cell is a multiple of them
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

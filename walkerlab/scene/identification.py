@@ -155,7 +155,7 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None =
 
 
 def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
-    """Return the number of steps from the subject's state to the start of its `step_map_of`."""
+    """Return the number of steps from the state of the subject to the start of `step_map_of`."""
     return ((leg or subject.first_leg) - subject.first_leg) % family.stride
 
 
@@ -176,8 +176,8 @@ def identify_walk(
     """Fit parameters to a measured walk with each model, and return the likeliest result, preferring models that fit.
 
     gait   summary of `fixedpoint` for the config
-    note   receives messages
-    begin  receives the name of each fit and its maximum number of rounds, returns a function to call at each round
+    note   called with each message
+    begin  called with the name and the maximum number of rounds of each fit; returns a function to call at each round
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
@@ -305,7 +305,7 @@ def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
 def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: Fitted) -> Identification:
     """Build the result of an identification from its fits.
 
-    steps  fit that predicts the step periods; differs from `best` only if angles were fitted at their sample times
+    steps  fit that predicts the step periods. It differs from `best` only if angles were fitted at their sample times
     """
     problem = best.problem
     forecast = best.forecast

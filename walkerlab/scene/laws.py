@@ -43,7 +43,7 @@ def where_to_look(kind: LawKind) -> str:
 
 
 def missing_members(law: type, kind: LawKind) -> list[str]:
-    """List what a law's class lacks: members of its protocol, and registered cases of functions."""
+    """List what the class of a law lacks: members of the protocol, and registered cases of functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
     # A law with one of these functions needs the others, too. For example, counted events must also be sampled.

@@ -1,8 +1,8 @@
 """Build the parts of a config's walker, shared by both models: assemblies, from the dimensions of each type of walker.
 
-A body's frame has its origin at a hinge (the knee for a shank, otherwise the hip) and its y axis points up the body;
-"ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
-a leg's foot forward, so in a flexed knee the shank's angle is smaller than the thigh's.
+The frame of a body has its origin at a hinge (the knee for a shank, otherwise the hip). The y axis points up the body.
+"Ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
+the foot forward, so in a flexed knee the angle of the shank is smaller than that of the thigh.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ UPPER_END = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Limb:
-    """Rigid limb hanging from its upper end, SI."""
+    """Rigid limb, described from its upper end, SI."""
 
     length_m: float
     mass_kg: float

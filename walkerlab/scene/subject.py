@@ -1,6 +1,4 @@
-"""A model with its gait, ready to be disturbed or differentiated, and its step maps as functions of a parameter, for
-following families of gaits.
-"""
+"""Models with their gaits, ready to be disturbed or differentiated, and step maps over a parameter for families."""
 
 from __future__ import annotations
 
@@ -100,7 +98,7 @@ def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError
     )
 
 
-# Solver settings for walks of which only the number of steps matters; the budget is per step.
+# Solver settings, with a budget per step, for walks of which only the number of steps matters.
 QUICK_WALKS: Final = {
     RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
     CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
@@ -174,7 +172,7 @@ def find_model_gait(
     # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
-    # The scene's config may hold only the keys that a stage reads; the search copies a complete one.
+    # `config` may have only the keys that a stage reads, but the search needs a complete config to copy.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

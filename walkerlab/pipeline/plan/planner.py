@@ -22,7 +22,7 @@ class Planner:
     """Decides for each of some stages, under one config, whether to reuse, run or leave it out.
 
     stages    stages to bring up to date, each after the stages that it needs
-    force     run every stage that is not left out, even if its result is current
+    force     whether to run every stage that is not left out, even if the result is current
     again     whether to repeat walks at tighter tolerances to measure their numerical error
     answers   results so far, by stage
     left_out  reasons why stages are left out, by stage

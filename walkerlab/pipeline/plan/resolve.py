@@ -143,7 +143,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, files.ConfigFile] | None:
-    """Return the run with this name or folder, and its config, or None if there is no such run."""
+    """Return the run whose name or folder is `text`, with the config of the run, or None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
         return None

@@ -34,8 +34,9 @@ class Keys:
         self._digests: dict[tuple[str, ...], str] = {}
 
     def compute_keys(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all its inputs, by stage. Raises the same errors as
-        `Graph.needed_in_memory`.
+        """Return the keys of a stage and of all its inputs, by stage.
+
+        Raises the errors of `Graph.needed_in_memory`.
         """
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
@@ -46,7 +47,7 @@ class Keys:
     def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str], again: bool = True) -> Identity:
         """Return the identity of a stage's result under a config.
 
-        input_keys  keys of its inputs, by stage
+        input_keys  keys of the inputs, by stage
         again       as for `call_stage`; true for every stored result
         """
         once = {} if again else {"again": False}
@@ -83,7 +84,7 @@ Action = Literal["reuse", "run", "leave out"]
 
 UP_TO_DATE = "up to date"
 REMEMBERED = 256
-"""Number of results kept in memory; neighbouring points of a sweep often share inputs."""
+"""Number of results kept in memory. They pay off because neighbouring points of a sweep often share inputs."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +223,7 @@ def mentions(path: Path, key: str) -> bool:
 
 
 class LoadedCodeKeys(Keys):
-    """Builds identities for this process only. Its code does not change, so they need no code digest."""
+    """Builds identities for this process only. They need no code digest, because loaded code does not change."""
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:  # noqa: ARG002
         return ""

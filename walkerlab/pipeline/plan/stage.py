@@ -1,6 +1,6 @@
 """Stages of a pipeline, and the options of their commands.
 
-Extensions declare their stages with this file, and the command line builds its help from them, so the file imports no
+Extensions declare their stages with this file, and the help of the command line is built from them. So it imports no
 stage, no config schema and no NumPy.
 """
 
@@ -81,7 +81,7 @@ class Option:
     help: str
     kind: OptionKind = "word"
     needs: tuple[str, ...] = ()  # flags that must be given with it
-    runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
+    runs: str = ""  # stage that the command runs instead if the option is given; such an option sets no key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
@@ -114,17 +114,17 @@ class Stage:
     name: str  # name of the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # type of the config slice that `run` takes and its result depends on, or a function from a config to this type;
-    # None for the whole config
+    # Type of the slice of the config that `run` takes and the result depends on, or a function from a config to this
+    # type. None means the whole config.
     takes: type | Callable[[Config], type] | None
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
     needs_equal_legs: bool = False
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
     options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
-    # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
+    # "times": measures run times, so it must run alone. "draws": also writes files, from the results that exist.
     work: Literal["computes", "times", "draws"] = "computes"
-    # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
+    # The only command that runs the stage (that of its name or `STAGE --full`). Empty if all commands that need it do.
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
@@ -132,7 +132,7 @@ class Stage:
     # returns what else the result depends on, by name, such as digests of files and versions of other programs
     depends_on: Callable[[Config], Mapping[str, Any]] = no_dependencies
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
-    # "module:name" of the `Offer` of the stage's command; empty for the usual one, which works on a run
+    # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
     adds_command: str = ""
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that show this one's result if it is current
@@ -206,5 +206,5 @@ class Stage:
 
     @property
     def on_demand(self) -> bool:
-        """Whether only the stage's own command runs it."""
+        """Whether the stage runs only by the command of its name."""
         return self.only_by == self.name

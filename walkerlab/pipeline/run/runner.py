@@ -39,7 +39,7 @@ class StageReport:
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
     summary: dict[str, Any]  # summary of the result; empty if there is no result
     steps: tuple[Step, ...]  # action taken for each stage
-    # error of the stage if it has no answer, otherwise of the first stage without one; None if all have answers
+    # Error of the stage if it has no answer, otherwise of the first stage without one. None if all have answers.
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Options:
     """Options for running a stage."""
 
     force: bool = False  # run the stage and all that it needs, even if their results are current
-    wait: bool = True  # wait for another process that works in the folder, then reuse its results
+    wait: bool = True  # wait for another process that works in the folder, then reuse what it has stored
     jobs: int = 1  # maximum number of processes, for independent stages and for independent work units of a stage
     full: bool = False  # also run the stage's long campaigns
     dry: bool = False  # only report the plan, without changing a file
@@ -89,7 +89,7 @@ def execute(
 
     Raises ConfigError if the config lacks a block that the target requires or the folder holds results of another
     config, LockedError if another process works in the folder and `options.wait` is false, and StorageError. A stage
-    without an answer raises nothing; see `StageReport.no_answer`.
+    without an answer raises nothing, see `StageReport.no_answer`.
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)

@@ -32,7 +32,7 @@ NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, befor
 
 
 class WorkUnit(NamedTuple):
-    """Piece of work that is computed as a whole and stored under its name."""
+    """Piece of work that is computed as a whole. The result is stored under `name`."""
 
     name: str
     size: int  # number of parts that the unit adds to the progress
@@ -95,7 +95,7 @@ class Spread:
     def run(self, executor: SizedExecutor) -> None:
         """Compute all units.
 
-        Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs immediately.
+        Raises NoAnswer if workers keep dying before they compute anything, and bugs immediately.
         """
         while self.left or self._again or self._running:
             # One batch more than workers is handed out, so that no worker has to wait for its next one.

@@ -2,7 +2,7 @@
 
 A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
 scripts without a guard, code from standard input and notebooks can use workers. Workers end when their parent ends,
-for whatever reason; the parent handles keyboard interrupts.
+for whatever reason. The parent handles keyboard interrupts.
 
 Signals that stop a command raise an error in the main thread, but not inside LLVM callbacks, which lose it.
 """
@@ -67,7 +67,7 @@ def is_called_back(frame: FrameType | None) -> bool:
 def end_with_parent() -> None:
     """End this process and everything it has started as soon as its parent is gone.
 
-    This process must lead its session; the parent must hold the other end of standard input and never write to it.
+    This process must lead its session. The parent must hold the other end of standard input and never write to it.
     """
 
     def watch() -> None:
@@ -290,7 +290,7 @@ def map_in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index. Low ranks start first; long calls should have them, so that no call runs alone at the end
+    rank   rank of an index. Low ranks start first. Give them to long calls, so that no long call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -317,7 +317,7 @@ def tell(value: Any) -> None:
 
 
 _lines: list[Connection] = []
-"""Connection to the parent process in a worker; empty in any other process."""
+"""Connection to the parent process. Empty if this process is not a worker."""
 
 
 def serve(number: int, modules: Sequence[str]) -> None:

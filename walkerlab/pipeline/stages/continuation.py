@@ -47,10 +47,10 @@ class FamilyQuestion:
     span: ValueSpan
 
     def start_values(self) -> list[float]:
-        """Return the values at which the search looks for gaits, the config's own value first."""
+        """Return the values at which the search looks for gaits, the value in the config first."""
         current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
-        # A gait is most likely at the config's own value.
+        # A gait is most likely at the value in the config.
         return [*([current] if current in self.span else []), *(float(value) for value in spread)]
 
     @property
@@ -137,7 +137,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models whose gaits are followed.
 
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
-    of a span is invalid, or the second key equals the first or has a range without the config's own value.
+    of a span is invalid, or the second key equals the first or has a range without the value in the config.
     """
     config = question.config
     second = question.second

@@ -36,7 +36,7 @@ from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unre
 
 SOLVED: Final = Effort(1e-10)
 DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
-FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; a coarser one would add noise that misleads the search
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; if it were coarser, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
@@ -50,7 +50,7 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum.
 
-    checkpoint  results of searches that an earlier run completed; new results are added
+    checkpoint  results of searches that an earlier run completed, to which new results are added
 
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """

@@ -66,7 +66,7 @@ def groups(
 ) -> dict[str, Group]:  # fmt: skip
     """Build a group for each branch, each curve, and the bifurcations, exponents and attractor of each model.
 
-    answer  summary of the stage; its branches, bifurcations and curves are also stored as tables
+    answer  summary of the stage, whose branches, bifurcations and curves are also stored as tables
     second  second parameter, if gaits are followed over a plane
     """
     value = {"value": Label(parameter.unit, parameter.key)}

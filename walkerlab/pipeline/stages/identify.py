@@ -261,7 +261,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     """Build the identified and measured motions of the first steps, or an empty mapping for kneed walkers,
     because their shank angles are not read.
 
-    Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
+    Both motions use the identified footholds and the same phases. Angles are corrected for sensor offset and gain.
 
     config  config of the identified walker
     """

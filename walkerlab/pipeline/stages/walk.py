@@ -46,7 +46,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
     walk        repeats the walk with other tolerances and returns its summary
 
     Returns the largest change of each step quantity, named as in `ERROR_OF_EACH_STEP`, the change of `end_time_s` (s)
-    and, for a driven walk, the change of `cost_of_transport`; `of_steps` has the largest changes up to each step. `by`
+    and, for a driven walk, the change of `cost_of_transport`. `of_steps` has the largest changes up to each step. `by`
     describes the tighter settings unless they are the usual ones. If the two walks end differently, only `reason` is
     returned.
     """

@@ -74,7 +74,7 @@ NOT_THERE = "not there yet"
 """Reason for running a stage without a stored result."""
 
 LIMIT_BYTES = 1 << 30
-"""Maximum size of an artifact; larger files are not read."""
+"""Maximum size of an artifact. Larger files are not read."""
 
 # The seal follows the HDF5 data. It reveals damaged files before the HDF5 library reads them, because some of them make
 # the library free memory twice.
@@ -87,7 +87,7 @@ NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""Attributes at the root of every artifact; content with arrays at the root may add others."""
+"""Attributes at the root of every artifact. Content with arrays at the root may add others."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
@@ -118,7 +118,7 @@ class Lookup:
     """Whether a file is the artifact with a given key, and the reason if it is not."""
 
     accepted: bool
-    reason: str  # reason for rejecting it; empty if accepted
+    reason: str  # reason for rejecting the file; empty if it is accepted
     artifact: Stored | None = None  # the artifact as read, even if its key differs; None if missing or damaged
     damaged: bool = False  # whether the file exists but cannot be trusted
 

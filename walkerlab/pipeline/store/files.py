@@ -1,7 +1,7 @@
 """Files: atomic writing, errors of the file system, CSV that is safe to open in a spreadsheet, and checkpoints.
 
 A checkpoint is a journal next to the artifact, from which an interrupted run resumes: first the key of the result, then
-a line for each unit of work, each with a checksum. Lines are only appended; an incomplete last line is dropped.
+a line for each unit of work, each with a checksum. Lines are only appended. An incomplete last line is dropped.
 """
 
 import contextlib

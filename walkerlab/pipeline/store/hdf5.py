@@ -151,7 +151,7 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
     """Parse the groups, by path, and the root attributes of an untrusted HDF5 file.
 
     Data that declare more than the file can hold are not read. Raises ValueError for them and for content that `image`
-    cannot write, and the HDF5 library's own errors.
+    cannot write, and the errors of the HDF5 library.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
         return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)

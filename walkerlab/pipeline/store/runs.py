@@ -141,7 +141,8 @@ class RunFolder:
 
         Creates the folder if needed and removes leftovers of killed writers.
 
-        wait  whether to wait for another process; `say` is then called with a message
+        wait  whether to wait for another process
+        say   called with a message before waiting
 
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
         the lock file cannot be created.
@@ -321,7 +322,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run that a result, drawing or record belongs to, or None for the user's own files."""
+    """Return the run that a result, drawing or record belongs to, or None for other files, which are the user's."""
     resolved = path.resolve()
     # Results are in the run's folder, and drawings in a folder below it.
     for place in (resolved.parent, resolved.parent.parent):

@@ -45,7 +45,7 @@ class PointResult:
     numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
     wall_s: Annotated[float, Label("s", "computation time", timing=True)] = 0.0
     bug: str = ""
-    """Traceback of a bug that stopped the computation; empty if there was none."""
+    """Traceback of a bug that stopped the computation, or '' if there was none."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ def input_cache(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - o
 def compute_point(
     config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "", expected: str | None = None
 ) -> Chunk:
-    """Compute one point in this process. An error becomes its result.
+    """Compute one point in this process. If that fails, the result contains the error.
 
     key       stage key of the point's result
-    again     whether to repeat its walk to measure the numerical error
+    again     whether to repeat the walk of the point to measure the numerical error
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
     expected  the caller's `versions` of extensions, which must be those of this process; None not to compare them
     """
@@ -173,7 +173,7 @@ def stored_chunks(
 ) -> Iterator[Chunk]:
     """Iterate over a stage's results that the present code has computed and stored, in all run folders.
 
-    keys  stage keys of the sweep; chunks are all included, results of single runs only if their keys match
+    keys  stage keys of the sweep. Results of single runs are included only if their keys match, chunks always
     warn  called with a message about each damaged chunk
     """
     for path in sorted(runs_dir.glob(f"*/{CHUNKS}/{stage}-{code_digest[:8]}-*.h5")):

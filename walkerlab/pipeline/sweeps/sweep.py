@@ -44,7 +44,7 @@ class SweepWork:
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
-    # called after each chunk with an answer, with the names of all quantities so far; may raise an error
+    # Called with the names of all quantities so far, after each chunk with an answer. It may raise an error.
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
