@@ -54,7 +54,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-FAR_OFF: Final = 0.01  # rad or rad/s; a start is rejected if a stated value is off by more than this
+MAX_START_ERROR: Final = 0.01  # rad or rad/s; a start is rejected if a stated value is off by more than this
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
@@ -122,7 +122,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
         if before is None or abs(value - before) <= MOVED_RAD:
             continue
         change = f"start: {name} {{}} {fields.short_number(before)} {{}} {fields.short_number(value)} {unit}, {because}"
-        if abs(value - before) > FAR_OFF:
+        if abs(value - before) > MAX_START_ERROR:
             as_it_is = ", ".join("null" if each is None else fields.short_number(each) for each in stated)
             midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."

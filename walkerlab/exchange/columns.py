@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.marker_lines import (
-    HUGE,
+    MAX_VALUE,
     Line,
     body_doubts,
     body_gaps,
@@ -58,7 +58,7 @@ PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
 FRAME_TIME: Final = "frame / fps"
 SAME_RATE: Final = 0.01  # frame rates that differ by less than this (relative) count as equal
 LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
-UNLIKELY: Final = 0.5  # likelihood below which the position of a marker is doubtful
+DOUBTFUL_LIKELIHOOD: Final = 0.5  # likelihood below which the position of a marker is doubtful
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,10 +216,10 @@ def remove_unlikely_positions(
         if re.fullmatch(rf"{re.escape(marker)}{LIKELIHOOD}", column)
     }
     if least is None:
-        low = {marker: each for marker, each in likelihoods.items() if np.any(each < UNLIKELY)}
-        spelled = ", ".join(f"{marker} at {spell_rows(each < UNLIKELY)}" for marker, each in low.items())
+        low = {marker: each for marker, each in likelihoods.items() if np.any(each < DOUBTFUL_LIKELIHOOD)}
+        spelled = ", ".join(f"{marker} at {spell_rows(each < DOUBTFUL_LIKELIHOOD)}" for marker, each in low.items())
         return recording, [
-            f"Likelihoods are below {UNLIKELY:g}: {spelled}; --min-likelihood makes such places gaps."
+            f"Likelihoods are below {DOUBTFUL_LIKELIHOOD:g}: {spelled}; --min-likelihood makes such places gaps."
         ] if low else []
     if not likelihoods:
         raise ConfigError(
@@ -343,7 +343,7 @@ def rows_without_gaps(
     used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
         refuse_problem(recording, column)
-    finite = {column: np.abs(recording.columns[column]) < HUGE for column in used}
+    finite = {column: np.abs(recording.columns[column]) < MAX_VALUE for column in used}
     whole = rows & np.all(list(finite.values()), axis=0)
     if not whole.any():
         raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")

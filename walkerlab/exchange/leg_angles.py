@@ -13,14 +13,14 @@ import numpy as np
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, only_rows
-from walkerlab.exchange.marker_lines import NAMED, spell_samples, swap_doubt, swapped_rows
+from walkerlab.exchange.marker_lines import MAX_NAMED, spell_samples, swap_doubt, swapped_rows
 from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
-from walkerlab.exchange.touches import ERRORS
+from walkerlab.exchange.touches import SIGNIFICANT_ERRORS
 
 UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg's angle from the vertical
-FEWEST_PASSING: Final = 3  # a passing of the legs takes at least this many sample intervals
-TINY: Final = 1e-30  # rad^2, added to a variance that may be zero
+MIN_PASSING_SAMPLES: Final = 3  # a passing of the legs takes at least this many sample intervals
+MIN_VARIANCE: Final = 1e-30  # rad^2, added to a variance that may be zero
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
         spelled = ", ".join(
             f"angle {jump.leg + 1} jumps by {jump.offset_rad:.3g} rad from sample {numbers[jump.first - 1]:.0f} to "
             f"{numbers[jump.first]:.0f} (time {walk.time_s[jump.first]:.6g} s)"
-            for jump in jumps[:NAMED]
+            for jump in jumps[:MAX_NAMED]
         )
         kept = f"from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s"
         doubt = (
@@ -171,9 +171,9 @@ def find_ways(time: Array, angle: Array) -> list[Way]:
     trends = [
         (last, first, trend(time[last : first + 1], total[last : first + 1]))
         for (_, last), (first, _) in pairwise(runs)
-        if spread[last] * spread[first] < 0.0 and first - last >= FEWEST_PASSING
+        if spread[last] * spread[first] < 0.0 and first - last >= MIN_PASSING_SAMPLES
     ]
-    passings = [(last, first, errors > 0.0) for last, first, errors in trends if abs(errors) > ERRORS]
+    passings = [(last, first, errors > 0.0) for last, first, errors in trends if abs(errors) > SIGNIFICANT_ERRORS]
     alike = [list(group) for _, group in groupby(passings, itemgetter(2))]
     lasting = [passing for group in alike if len(group) > 1 for passing in group] or passings
     return [Way(way, [(a, b) for a, b, _ in group]) for way, group in groupby(lasting, itemgetter(2))]
@@ -184,7 +184,7 @@ def trend(time: Array, values: Array) -> float:
     share = (time - np.mean(time)) / np.ptp(time)
     slope = float(share @ values) / float(share @ share)
     residuals = values - np.mean(values) - slope * share
-    return slope / math.sqrt(float(residuals @ residuals) / (time.size - 2) / float(share @ share) + TINY)
+    return slope / math.sqrt(float(residuals @ residuals) / (time.size - 2) / float(share @ share) + MIN_VARIANCE)
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:

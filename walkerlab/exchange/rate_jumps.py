@@ -21,11 +21,11 @@ WINDOW_AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, as a fraction of the largest during the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
-MOST_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
+MAX_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
 WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
 SAMPLES_ON_A_SIDE: Final = 4  # minimum number of samples for a fit, before and after an instant
 DEGREE: Final = 3
-SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
+MIN_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
 RIDGE: Final = 1e-15  # relative; without it, samples at nearly equal times would make equations singular
@@ -42,7 +42,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     sums = total(angle)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.abs(spread).max(), spread > 0.0)
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
-    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
+    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MAX_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
     # The comparisons differ, so that only the first of equal neighbours is a peak.
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
@@ -174,4 +174,4 @@ def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[flo
     basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
     shares = basis.T @ y
     residual = float((y**2).sum() - (shares**2).sum())
-    return float((shares[-1] ** 2).sum()), max(residual, SMALLEST_SCATTER * float((y**2).sum())), y.size - shares.size
+    return float((shares[-1] ** 2).sum()), max(residual, MIN_SCATTER * float((y**2).sum())), y.size - shares.size

@@ -33,23 +33,23 @@ MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbou
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-LONGEST: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
+MAX_STRETCH: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
 BORDER: Final = 0.1  # fraction of a step at the far end of a fit that is left to other fits
-LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
-LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
+LASTING_BORDER: Final = 0.15  # as `BORDER`, for lasting jumps
+LENGTH_TRIALS: Final = 16  # number of lengths of a stretch that are tried first
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
 NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
 STANDARD_ERRORS: Final = 7.0
-TYPICAL: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
+MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
 TYPICAL_PERCENT: Final = 30
-WIDEST_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
+MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
 MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
-NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
-SUSPECT: Final = 0.5  # above this fraction of the limit, stretch and strike are searched for together
-SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
-MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-SMALLEST_NORM: Final = 0.12  # smallest squared part of a stretch, in samples, that polynomials must not follow
-NORMAL: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
+MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
+JOINT_SEARCH_FRACTION: Final = 0.5  # above this fraction of the limit, stretch and strike are searched for together
+MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
+MAX_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
+MIN_NORM: Final = 0.12  # smallest squared part of a stretch, in samples, that polynomials must not follow
+MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Strike:
         """Return the residuals of the smooth course, scaled up because the fit follows part of the scatter."""
         basis, residuals = self.smooth_fit
         free = 1.0 - np.sum(basis**2, axis=1)
-        clear = free > SMALLEST_NORM
+        clear = free > MIN_NORM
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
 
     def best_with_strike(self) -> tuple[Stretch, float]:
@@ -114,12 +114,12 @@ class Strike:
     def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
         """Return the stretch that explains most of the residuals of a fit (basis and residuals)."""
         sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
-        longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
-        lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
+        longest = max(1, int(np.searchsorted(self.time, self.time[0] + MAX_STRETCH * self.step_s)))
+        lengths = np.unique(np.geomspace(1, longest, LENGTH_TRIALS).astype(int))
         low, high = self.inner_samples(BORDER)
         # To save time, long stretches are tried at widely spaced positions. The best one is refined below.
         short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
-        inner = np.arange(*self.inner_samples(LASTING, whole=False))
+        inner = np.arange(*self.inner_samples(LASTING_BORDER, whole=False))
         count = self.time.size
         lasting = first_and_end(inner, count - inner)
         spans = np.concatenate((short[short[:, 1] <= high], lasting))
@@ -186,7 +186,7 @@ def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int
     """Return first sample, end and leg of the span that explains most of the residuals."""
     norm, share = parts_of(sums, spans)
     # Over some spans polynomials follow a constant almost entirely. Dividing by the rest would magnify rounding.
-    explained = np.where(norm > SMALLEST_NORM, 1.0 / np.maximum(norm, SMALLEST_NORM), 0.0)[:, None] * share**2
+    explained = np.where(norm > MIN_NORM, 1.0 / np.maximum(norm, MIN_NORM), 0.0)[:, None] * share**2
     best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
     return int(spans[best, 0]), int(spans[best, 1]), int(leg)
 
@@ -198,22 +198,24 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     angle  (samples, 2) rad, from the vertical
     """
     far = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
-    if noise_of(angle) > NOISY * far:
+    if noise_of(angle) > MAX_SCATTER * far:
         return []
-    found = find_leaps(time, angle, LONGEST * course_of(time, angle).step_s)
+    found = find_leaps(time, angle, MAX_STRETCH * course_of(time, angle).step_s)
     course = course_of(time, angle, found)
     strikes = course.strikes(range(len(course.spans)))
     sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
     # Polynomials through sparse samples would follow errors, too.
-    if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
+    if not sampled or np.max(np.diff(time)) > MAX_GAP * course.step_s:
         return found
-    scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
+    scatter = MAD_TO_DEVIATION * float(
+        np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes])))
+    )
     worst = [strike.best_stretch(strike.smooth_fit).explained for strike in strikes]
-    limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
+    limit = max((STANDARD_ERRORS * scatter) ** 2, MIN_EXPLAINED_RATIO * float(np.percentile(worst, TYPICAL_PERCENT)))
     # A false strike in one step makes the neighbouring steps look wrong as well.
     for index in np.argsort(worst)[::-1].tolist():
-        if worst[index] > SUSPECT * limit:
-            new = stretches_near(course, index, limit, SMALLEST * far)
+        if worst[index] > JOINT_SEARCH_FRACTION * limit:
+            new = stretches_near(course, index, limit, MIN_OFFSET * far)
             found = found + new
             course = course.remove_stretches(new)
     return found
@@ -242,7 +244,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch in addition to others, or None if it is within the limit."""
         strike = course.remove_stretches(others).strikes([index])[0]
-        if strike.best_stretch(strike.smooth_fit).explained <= SUSPECT * limit:
+        if strike.best_stretch(strike.smooth_fit).explained <= JOINT_SEARCH_FRACTION * limit:
             return None
         stretch, left = strike.best_with_strike()
         explains = float(np.sum(strike.smooth_fit[1] ** 2)) - left > limit
@@ -252,7 +254,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
         return replace(stretch, first=int(rows[stretch.first]), end=int(rows[stretch.end - 1]) + 1)
 
     found: list[Stretch] = []
-    while len(found) < MOST_STRETCHES and (stretch := worst(found)):
+    while len(found) < MAX_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
     # Each stretch was found without the later ones. With them, it may no longer be needed.
     for stretch in found[:-1]:

@@ -27,24 +27,24 @@ ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
 MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
-SHORTEST: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
-SLOWEST: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is no heel strike
+MIN_CROSSING_INTERVAL: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
+MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is no heel strike
 ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
-LOCATED: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
-ERRORS: Final = 3.0  # a value within this many standard errors of zero counts as zero
-LASTING_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
+MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
+SIGNIFICANT_ERRORS: Final = 3.0  # a value within this many standard errors of zero counts as zero
+STRIKE_DURATION_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # fewest samples in that time
 JUMP_DEGREE: Final = 4
 # A jump counts if it is displaced by this many standard errors. They are many, because many instants are tried.
 JUMP_ERRORS: Final = 4.5
-MOST_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
+MAX_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
 SIDES: Final = 2
-LOPSIDED: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
-SMALLEST: Final = 1e-30  # rad^2, added to sums of squares because the logarithm of 0 does not exist
+MIN_SIDE_RATIO: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
+MIN_SQUARES: Final = 1e-30  # rad^2, added to sums of squares because the logarithm of 0 does not exist
 
 
 @dataclass(frozen=True)
@@ -89,14 +89,14 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     crossings = candidates(time, angle, height)
     # The period is not known yet, so at first all consecutive crossings of a leg count as one strike.
     period = typical_interval([crossing for crossing, *_ in merge_repeats(crossings, np.inf)], time)
-    merged = merge_repeats(crossings, SHORTEST * period)
+    merged = merge_repeats(crossings, MIN_CROSSING_INTERVAL * period)
     located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg, _ in merged])
     # A fit may move a crossing near the first sample to a time before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
     first = touch_at_start(time, angle, height, period)
     if first is not None:
-        touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + SHORTEST * period)]
-    slowest = SLOWEST * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
+        touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + MIN_CROSSING_INTERVAL * period)]
+    slowest = MIN_FALL_SPEED * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
     return [touch for touch in touches if touch.fall_m_s >= slowest]
 
 
@@ -156,7 +156,7 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     fit = fits.get(degree + 1) or fits.get(degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
-    if touch is None or touch.error_s >= PRECISE_S or off > ERRORS * touch.error_s:
+    if touch is None or touch.error_s >= PRECISE_S or off > SIGNIFICANT_ERRORS * touch.error_s:
         return None
     # A strike just before the recording looks like one at the first sample. The error includes the distance in the fit.
     return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
@@ -192,7 +192,7 @@ def locate_touch(
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
-        if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
+        if iteration >= DEGREE_ITERATIONS and abs(correction) < MAX_CORRECTION * touch.error_s:
             return touch_of(add_bias(touch.fit, fits.get(degree), fits.get(degree + 1)), height, near + at, leg)
         at += correction
     # If samples keep changing sides, the zero keeps moving. Its error is then the size of its moves.
@@ -237,7 +237,7 @@ def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
     gradient = (values[:2] - values[2:]) / 2e-6
     slope = float(gradient @ next(iter(fit.rates.values())))
-    error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), LASTING_S) if slope else np.inf
+    error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), STRIKE_DURATION_S) if slope else np.inf
     # The height is that of foot 0 over foot 1, so it rises as foot 1 comes down.
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
@@ -266,7 +266,7 @@ def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
         counts = {"before": split, "after": t.size - split}
         by_sides: dict[tuple[str, ...], tuple[int, ...]] = {}
         for degree in degrees:
-            fewest = max(degree + 1, LOPSIDED * max(counts.values()))
+            fewest = max(degree + 1, MIN_SIDE_RATIO * max(counts.values()))
             names = tuple(name for name, count in counts.items() if count >= fewest)
             if sum(counts[name] for name in names) > 1 + degree * len(names):
                 by_sides[names] = (*by_sides.get(names, ()), degree)
@@ -304,7 +304,7 @@ def fit_sides(
     orthonormal, triangle = np.linalg.qr(basis)
     inverse = np.linalg.inv(triangle)
     shares = orthonormal.mT @ y
-    left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + SMALLEST
+    left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + MIN_SQUARES
     # Sums over the columns that a lower degree lacks, and over those that it has.
     missed = np.pad(np.cumsum(np.sum(shares**2, axis=2)[:, ::-1], axis=1)[:, ::-1], ((0, 0), (0, 1)))
     variances = np.cumsum(inverse[:, 0] ** 2, axis=1)
@@ -337,7 +337,7 @@ def angles_at_jumps(
     errors  number of standard errors
     """
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), MAX_FIT_TIME * period)
-    inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
+    inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MAX_JUMPS]
     parts = [
         (time[rows] - touch.time_s, angle[rows]) for touch in inside for rows in [rows_within(time, touch.time_s, half)]
     ]
@@ -347,7 +347,7 @@ def angles_at_jumps(
     for t, _ in parts:
         after = np.searchsorted(t, shifts)
         fewer, more = np.sort((after, t.size - after), axis=0)
-        shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, LOPSIDED * more)]
+        shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, MIN_SIDE_RATIO * more)]
     # Without the unshifted strikes there is nothing to compare shifts with.
     if not parts or not np.any(shifts == 0.0):
         return None

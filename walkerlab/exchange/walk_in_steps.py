@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
 from walkerlab.exchange.leg_angles import read_leg_angles
-from walkerlab.exchange.marker_lines import NAMED
+from walkerlab.exchange.marker_lines import MAX_NAMED
 from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
 from walkerlab.exchange.smooth_course import FAR_PERCENT, HIGHEST_DEGREE, SAMPLES_PER_DEGREE
-from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
+from walkerlab.exchange.touches import SIGNIFICANT_ERRORS, Height, Touch, angles_at_jumps, find_touches
 from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -36,31 +36,32 @@ if TYPE_CHECKING:
 
 # An angle that reaches backwards this many times as far as at heel strikes is that of a shank.
 SHANK_SWING_RATIO: Final = 1.4
-WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
+MAX_SPREAD_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
-MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
-LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
+MAX_STEP_SAMPLES: Final = 250  # largest number of samples kept within a step
+MAX_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
 """Shortest and longest plausible step, in s or m. Other values are damaged or in another unit."""
-NARROWEST_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
-SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
-LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
-FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
-ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
+MIN_SPREAD_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
+MIN_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
+MAX_SCATTER: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
+MIN_ALTERNATING_STRIKES: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
+MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
 SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
 """Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
-FAR_CLOCK: Final = 1.15  # a doubt is raised if the clock runs faster or slower than the swinging legs by this factor
+MAX_CLOCK_RATIO: Final = 1.15  # a clock that differs more from the swinging legs raises a doubt
 NOISE_IN_CLOCK: Final = 7.0  # the limit grows by this multiple of the scatter of the angles, relative to the angles
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-COARSE: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
-CONSTANT: Final = 0.25  # an error counts as constant if it scatters over a step by at most this fraction
-SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
-SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
+MAX_SPACING: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
+MAX_ERROR_SCATTER: Final = 0.25  # an error counts as constant if it scatters over a step by at most this fraction
+MIN_DISTANCE_M: Final = 1e-30  # m, smallest distance by which a value is divided
+# time from the last sample of a step to the heel strike, as a fraction of the duration of the walk
+STRIKE_MARGIN: Final = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +144,7 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
     """
     apart = hips_apart(model, angles)
     direction = np.angle(apart)
-    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), SMALLEST), -1.0, 1.0))
+    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), MIN_DISTANCE_M), -1.0, 1.0))
     return np.asarray(2.0 * (direction - np.sign(direction) * level))
 
 
@@ -212,7 +213,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     # The two coefficients are the components of gravity in the tilted axes, so together they give its magnitude.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
-    far = FAR_CLOCK + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
+    far = MAX_CLOCK_RATIO + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
     if 1.0 / far < rate < far:
         return steps
     doubt = (
@@ -252,7 +253,7 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
     if not breaks or len(longest) < 2:
         return longest, []
     kept = f"only the steps from time {longest[0].time_s:.6g} to {longest[-1].time_s:.6g} s are kept"
-    return longest, [f"The same leg strikes twice in a row ({', '.join(breaks[:NAMED])}), so that {kept}."]
+    return longest, [f"The same leg strikes twice in a row ({', '.join(breaks[:MAX_NAMED])}), so that {kept}."]
 
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
@@ -272,7 +273,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
 def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None:
     """Raise ConfigError if the legs are too far apart at a heel strike and nothing states the unit of their angles."""
     apart, time = max((abs(float(np.diff(touch.fit.angle)[0])), touch.time_s) for touch in touches)
-    if apart > WIDEST_RAD and not walk.unit_is_stated:
+    if apart > MAX_SPREAD_RAD and not walk.unit_is_stated:
         raise ConfigError(
             f"{source}: the legs are {math.degrees(apart):.0f} degrees apart at time {time:.6g} s.",
             "State the unit of angles: --units angle=deg, or --units angle=rad if they are that far apart.",
@@ -311,11 +312,11 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 def alternates(first: Array, second: Array) -> bool:
     """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
-    if min(first.size, second.size) < FEWEST_ALTERNATING:
+    if min(first.size, second.size) < MIN_ALTERNATING_STRIKES:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
     means = float(np.mean(first)), float(np.mean(second))
-    return abs(means[0] - means[1]) > max(ERRORS * error, ALTERNATING * sum(means))
+    return abs(means[0] - means[1]) > max(SIGNIFICANT_ERRORS * error, MIN_ALTERNATION * sum(means))
 
 
 def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | None:
@@ -331,7 +332,7 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
     # The stance leg is the other one, so it shows the constant with the opposite sign.
     differences = np.array([swing, -stance])
     constant = float(np.mean(differences))
-    return constant if float(np.std(differences)) < CONSTANT * abs(constant) else None
+    return constant if float(np.std(differences)) < MAX_ERROR_SCATTER * abs(constant) else None
 
 
 def offset_doubts(
@@ -351,7 +352,7 @@ def offset_doubts(
     after = mismatch(time, angle - errors, right, model, touch_sum_rad) if len(right) > 1 else before
     degrees = np.degrees(errors)
     digit = float(np.diff(np.unique(np.round(angle, 9))).min())
-    if after.shift_s or after.lengths_m or after.limps or digit > COARSE * float(np.abs(errors).max()):
+    if after.shift_s or after.lengths_m or after.limps or digit > MAX_SPACING * float(np.abs(errors).max()):
         cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be the cause"
     elif alternate:
         cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
@@ -373,7 +374,7 @@ def refuse_noise(angle: Array, source: str) -> None:
     """Raise ConfigError if scatter hides the heel strikes."""
     noise = noise_of(angle)
     apart = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
-    if noise > LOUDEST * apart:
+    if noise > MAX_SCATTER * apart:
         raise ConfigError(
             f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, and the legs are {apart:.2g} rad "
             "apart: heel strikes found there would be noise.",
@@ -384,7 +385,7 @@ def refuse_noise(angle: Array, source: str) -> None:
 def unit_doubts(touches: list[Touch]) -> Iterator[str]:
     """Yield a doubt about the unit of the angles if the legs are very close to each other at heel strikes."""
     apart = float(np.median([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in touches]))
-    if apart < NARROWEST_RAD:
+    if apart < MIN_SPREAD_RAD:
         yield (
             f"The legs are only {math.degrees(apart):.2g} degrees apart at heel strikes. The file may state "
             "the wrong unit of angles."
@@ -397,7 +398,7 @@ def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
     # With a spring at the hip, a leg may swing much faster than a hanging pendulum, so there is no limit.
     swing_s = math.pi * math.sqrt(model.A[SWING, SWING] / weight) if weight and not model.sprung else 0.0
-    if step_s < SHORTEST_STEP * swing_s:
+    if step_s < MIN_STEP * swing_s:
         raise ConfigError(
             f"{source}: steps of {step_s:.3g} s are not credible, because a leg of this walker swings forwards in "
             f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is wrong.",
@@ -427,12 +428,11 @@ def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
     """Raise ConfigError for a step whose samples are too far apart to determine its heel strikes and velocities."""
     for number, (begin, end) in enumerate(pairwise(touches), 1):
         first, last = longest_gap(walk.time_s, begin, end)
-        if last - first > LONGEST_GAP * (end - begin):
+        if last - first > MAX_GAP * (end - begin):
             raise ConfigError(
                 f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
                 f"{(last - first) / (end - begin):.0%} of its duration.{f' {walk.gaps}.' if walk.gaps else ''}",
-                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or read a part without gaps (--from-s, "
-                "--to-s).",
+                f"Record at least {1 / MAX_GAP:.0f} samples per step, or read a part without gaps (--from-s, --to-s).",
             )
 
 
@@ -454,7 +454,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin
     # The sample at a strike begins the next step, so the last sample of a step lies just before it.
-    side = SIDE * float(times[-1])
+    side = STRIKE_MARGIN * float(times[-1])
     spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
@@ -488,7 +488,7 @@ def is_recorded_beyond(time: Array, touches: Array) -> bool:
     if np.count_nonzero(time >= touches[-1]) <= SPLINE_DEGREE:
         return False
     first, last = longest_gap(time, float(touches[-1]), float(time[-1]))
-    return last - first <= LONGEST_GAP * float(np.diff(touches, prepend=0.0)[-1])
+    return last - first <= MAX_GAP * float(np.diff(touches, prepend=0.0)[-1])
 
 
 def samples_within(time: Array, columns: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -499,7 +499,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     first, after = np.searchsorted(time, begin), np.searchsorted(time, end, "right")
     spline = spline_through(time[first:after], columns[first:after])
     inside = np.arange(np.searchsorted(time, begin, "right"), np.searchsorted(time, end))
-    inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
+    inside = inside[:: max(1, math.ceil(inside.size / MAX_STEP_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
     # The spline is used only for the ends and for velocities. All other values stay as recorded.

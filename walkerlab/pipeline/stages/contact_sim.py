@@ -34,7 +34,7 @@ from walkerlab.scene.omissions import contact_walk_omissions
 from walkerlab.scene.parts import TORSO
 from walkerlab.scene.rigid import foothold_heights
 
-RESOLVED = 0.1  # above this ratio of tolerance to stiction velocity, slips are not resolved
+MAX_TOLERANCE_RATIO = 0.1  # above this ratio of tolerance to stiction velocity, slips are not resolved
 SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
@@ -71,7 +71,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: Progress) -> None:
     """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
-    if atol > RESOLVED * rising:
+    if atol > MAX_TOLERANCE_RATIO * rising:
         progress.note(
             f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large relative to contact.stiction_velocity "
             f"({rising:g} m/s), up to which friction rises, so friction and the outcome may be due to chance"

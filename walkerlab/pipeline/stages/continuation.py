@@ -32,9 +32,9 @@ from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds of a search, and a function that returns the step map of a config over the parameter."""
-SHORTEST_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
+MIN_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
+TIGHT_EFFORT = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
@@ -111,7 +111,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
         search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
         # A branch may consist of a single point if it can be followed in neither direction.
-        short = SHORTEST_REACH * question.span.size
+        short = MIN_REACH * question.span.size
         isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
     answer = summary(families, question, again)
@@ -314,7 +314,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     tighter, by = tightened(step_map.tolerances)
     otherwise = step_map.replace_tolerances(tighter)
     repeated = [
-        (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
+        (point, gait_near(otherwise, point.z, point.value, TIGHT_EFFORT, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [

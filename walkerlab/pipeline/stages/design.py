@@ -38,7 +38,7 @@ SOLVED: Final = Effort(1e-10)
 DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
 FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; if it were coarser, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
-MEETING: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
+MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
     "start": Label("SI", "start of the search"),
@@ -116,7 +116,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         "without_gait": int(gaits.counts[1]),
         "optima": ends,
         "starts": design.starts,
-        "multipliers_meet": best.point.apart < MEETING,
+        "multipliers_meet": best.point.apart < MEETING_GAP,
         "robustness": [
             {"quantity": name, **{place: of[name] for place, of in robust.items() if name in of}} for name in ROBUSTNESS
         ],

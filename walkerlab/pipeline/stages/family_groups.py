@@ -26,7 +26,7 @@ from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
 MOTIONS_OF_BRANCH = 12  # number of gaits per branch whose walks are stored
-LONGEST = 4  # maximum period (steps) of these gaits
+MAX_MOTION_PERIOD = 4  # maximum period (steps) of these gaits
 STRIDE = 2  # number of steps after which the legs have the same roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
@@ -174,7 +174,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
-        if branch.period <= LONGEST
+        if branch.period <= MAX_MOTION_PERIOD
         for place in evenly_spread(len(branch.points), MOTIONS_OF_BRANCH)
         for group in motion(branch.points[place], branch.period, config, parameter)
     }

@@ -39,7 +39,7 @@ SHOWN_STEPS = 10
 """Number of steps that the motion player shows."""
 SHOWN_SAMPLES = 800
 """Approximate number of samples that the motion player shows."""
-FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
+FIT_FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -66,7 +66,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     if verdict.fit == "not-converged":
         open_combinations = "".join(f"; open: {entry.combination}" for entry in result.not_identifiable)
         reason = f"the fit of the {verdict.model} model did not converge: {verdict.reasons[0]}{open_combinations}"
-        raise NoAnswer(reason, FEWER, content)
+        raise NoAnswer(reason, FIT_FEWER, content)
     return content
 
 

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
-MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
+MAX_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
@@ -128,9 +128,9 @@ class MeasuredFile:
 
 
 def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
-    if measured.count > MOST_STEPS:
+    if measured.count > MAX_STEPS:
         raise ConfigError(
-            f"{path} has {measured.count} steps; at most {MOST_STEPS} are fitted at once.", "Cut it into shorter walks."
+            f"{path} has {measured.count} steps; at most {MAX_STEPS} are fitted at once.", "Cut it into shorter walks."
         )
     return measured
 

@@ -27,7 +27,7 @@ from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
-NOISY = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
+NOISY_RATIO = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -73,7 +73,7 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
     noise = noise_of(angles)
     amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
-    if noise > NOISY * amplitude:
+    if noise > NOISY_RATIO * amplitude:
         yield (
             f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
             "heel strikes, and so periods and lengths of single steps, are uncertain."

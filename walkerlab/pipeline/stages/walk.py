@@ -27,9 +27,9 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store.content import UNEVEN, Content, Group, Variable, labelled, numbered
 from walkerlab.scene.rigid import first_step_length, have_different_legs
 
-LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
+MIN_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
-MORE_WORK: Final = 10  # the evaluation budget is multiplied by this at tighter tolerances
+BUDGET_FACTOR: Final = 10  # the evaluation budget is multiplied by this at tighter tolerances
 SAMPLE: Final = 16  # maximum number of walks to repeat
 DEFAULT_TIGHTENING: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # relative difference from a divided tolerance that counts as rounding
@@ -56,10 +56,10 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
     """Return tighter tolerances with more budget, or another method if they cannot be tightened, and a description."""
-    tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
+    tolerances = replace(tolerances, budget=min(BUDGET_FACTOR * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
-        if rtol >= (1.0 - ROUNDING) * LEAST_RTOL:
+        if rtol >= (1.0 - ROUNDING) * MIN_RTOL:
             return replace(tolerances, rtol=rtol, atol=tolerances.atol / factor), by
     method = "dop853" if tolerances.method == "radau5" else "radau5"
     return replace(tolerances, method=method), f"another method, {method}"
@@ -164,7 +164,7 @@ STEP_LABELS: Final = {
     "state_after": Label("rad, rad/s", "state just after the touch, roles exchanged", (COORDINATE,)),
 }
 # Columns with missing values where a knee does not lock or the last stance foot does not lift.
-WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
+INCOMPLETE_COLUMNS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
 TIME_LABELS: Final = {
     "time": Label("s", "time"),
     "step": Label("1", "step number"),
@@ -311,7 +311,7 @@ def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[st
     columns = numbered(count, STEP, "step number")
     for name, column in {"touch_time_s": touch_time_s, **values}.items():
         if column is not None:
-            gaps = name in WITH_GAPS
+            gaps = name in INCOMPLETE_COLUMNS
             rows = np.append(column, np.full(count - np.size(column), np.nan)) if gaps else column
             columns[name] = labelled(rows, STEP_LABELS[name], STEP, gaps=gaps)
     return columns
