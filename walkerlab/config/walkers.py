@@ -463,9 +463,7 @@ class PartsWalker(AssembledWalker):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the first leg's sole below the hip for upright legs, or None if hinges do not
-    connect them.
-    """
+    """Return the depth (m) of the sole of upright leg 1 below the hip, or None if hinges do not connect them."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []

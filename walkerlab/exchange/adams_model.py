@@ -194,7 +194,7 @@ class AdamsModel:
         return f"{word}/{kind}, id = {self.numbers[name]}"
 
     def shape_name(self, shape: str) -> str:
-        """Prefix a shape's name with the name of its part."""
+        """Return the name of a shape, preceded by that of the part to which it belongs."""
         return f"{self.markers[self.shapes[shape].marker].part}.{shape}"
 
 
@@ -370,7 +370,7 @@ def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
         raise ConfigError(
             f"The normal-force law {type(normal).__name__} cannot be exported.", "Set contact.normal_force=impact."
         )
-    # Stiffness is in N/mm^e, so its factor depends on the exponent. ADAMS View scales it like force per length,
+    # Stiffness is in N/mm^e, so the factor depends on the exponent. ADAMS View scales it like force per length,
     # whatever the exponent is.
     in_mm = Impact(
         normal.stiffness / MM**normal.exponent,

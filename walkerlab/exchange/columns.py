@@ -46,9 +46,9 @@ UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Position (m) along the walk of the upper marker of the first line, if angles are those of lines."""
+"""Quantity: position (m) of the upper marker of the first line along the walk, if angles are those of lines."""
 SAMPLE: Final = "sample"
-"""Number of each sample in the file, from 1."""
+"""Quantity: number of each sample in the file, counted from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
 CHANGED: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
 """Pattern for a column with another sign, and a constant with its unit."""
@@ -86,7 +86,7 @@ class RecordedWalk:
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """Source of a quantity: a column, or a line between markers. Its values are multiplied by a sign, then shifted."""
+    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then shifted."""
 
     column: str
     sign: float = 1.0
@@ -266,7 +266,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
 
 
 def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
-    """Return the angle (rad) that Sports2D subtracted from the angles of segments to level the floor in its picture.
+    """Return the angle (rad) that Sports2D subtracted from the angles of segments to level the floor in the picture.
 
     Sports2D uses the same sign for walks in both directions, although it mirrors the picture of a walk to the left.
     """
@@ -527,14 +527,14 @@ def axes_of(recording: Recording, marker: str) -> dict[str, str]:
 
 
 def unknown_column_error(recording: Recording, column: str) -> ConfigError:
-    """Build the error for a column that the file lacks. It suggests the one with the most similar name."""
+    """Build the error for a column that the file lacks, with the most similar name as a suggestion."""
     near = get_close_matches(column, recording.columns, 1, 0.3)
     advice = f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
     return ConfigError(f"{recording.path} has no column {column!r}.", advice)
 
 
 def missing_error(recording: Recording, name: str) -> ConfigError:
-    """Build the error for a quantity without a column. It suggests the column with the most similar name."""
+    """Build the error for a quantity without a column, with the most similar name as a suggestion."""
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
         return ConfigError(

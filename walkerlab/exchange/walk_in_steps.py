@@ -476,7 +476,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for each end of a step, the row of its sample, the heel strike, and the rates within the step."""
+    """Return the row of the sample, the heel strike, and the rates within the step, for both ends of a step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
@@ -509,7 +509,7 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
 
 
 def spline_through(time: Array, columns: Array) -> BSpline:
-    """Fit a spline with evenly spaced knots, with fewer knots if there are few samples."""
+    """Fit a spline with evenly spaced knots, and with fewer of them if there are few samples."""
     # Imported here, because it is not needed to check whether a result is up to date.
     from scipy.interpolate import make_lsq_spline
 

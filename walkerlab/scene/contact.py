@@ -143,7 +143,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     return KneeRules(Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
-# Terrains by pitch and asymmetry of the steps. Leg 1 starts as far behind leg 2 as the second step is long.
+# Functions that lay out a terrain, given pitch and asymmetry of the steps. Leg 1 starts a second step behind leg 2.
 TERRAINS: dict[str, Callable[[float, float], Terrain]] = {
     "checkerboard": lambda pitch, asymmetry: checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
     "after-mid-swing": lambda pitch, _: after_mid_swing(pitch),

@@ -37,7 +37,7 @@ FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the sha
 
 @dataclass(frozen=True)
 class SlopeRange:
-    """Range of slopes (rad) with gaits, and the part of it with stable gaits, or None if no gait is stable."""
+    """Range of slopes (rad) with gaits, and the part with stable gaits, which is None if no gait is stable."""
 
     slopes: tuple[float, float]
     stable: tuple[float, float] | None

@@ -234,8 +234,7 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Make the drawings for which the results so far suffice. `why` explains the missing results of `unsettled`
-        stages.
+        """Make the drawings for which the results so far suffice. `why` is the reason that `unsettled` stages have none.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """

@@ -208,9 +208,7 @@ def gaussian(window: grid.Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing if no
-    cell fails.
-    """
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing without one."""
     # The error of the distance is the size of a cell.
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:

@@ -50,7 +50,7 @@ MIN_STEPS: Final = 2
 MAX_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
+SAME_TOUCHES: Final = 0.002  # rad; smaller changes of the sum of leg angles at heel strike do not count
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -104,7 +104,7 @@ class MeasuredFile:
     def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
         """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
 
-        config  config of the walker; None for that of the file
+        config  config of the walker, or None for that of the file
         """
         steps = self.find_steps(touch_sum_rad) if config is None else self.steps_of(config, touch_sum_rad)
         if steps.touch_time_s.size < MIN_STEPS:
@@ -152,7 +152,7 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
         raise ConfigError(
-            f"{block.data} is from {recording.levelled_by}, which makes the floor level: the slope turns the angles.",
+            f"{block.data} is from {recording.levelled_by}, which levels the floor, so the slope turns the angles.",
             "Give --camera-tilt floor, or --camera-tilt 0 if the recording's floor_angle was 0.",
             ("identify", "camera_tilt_deg"),
         )

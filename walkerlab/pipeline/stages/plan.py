@@ -205,7 +205,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """Predicted walk that has not been measured, with its derivatives."""
+    """Predicted walk, which has not been measured, with derivatives."""
 
     forecast: Forecast
     data: Linearised

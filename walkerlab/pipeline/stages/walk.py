@@ -302,9 +302,7 @@ def leg_labels() -> dict[str, Variable]:
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `STEP_LABELS`. NaN and values that the last steps lack are stored as
-    missing.
-    """
+    """Build variables over steps, named as in `STEP_LABELS`. Values are missing where they are NaN or lists are short."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -338,9 +336,7 @@ def measure_pace(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict
 
 
 def drive_measures(walk: WalkRecord) -> dict[str, Any]:
-    """Return the work of each drive per step and the cost of transport, or nothing for a walk that covers
-    no distance.
-    """
+    """Return the work of each drive per step and the cost of transport, or nothing if the walk gets nowhere."""
     distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
     if distance <= 0.0:
         return {}

@@ -15,9 +15,7 @@ SHIPPED = ("walkerlab", "configs")
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, with '-dirty' if its package files changed, or None outside a git
-    checkout.
-    """
+    """Return the commit of a source tree, with '-dirty' if package files have changed, or None outside a checkout."""
     # Without this check, git would report the commit of another checkout that contains the environment.
     if not (root / ".git").exists():
         return None

@@ -161,9 +161,7 @@ class Merge:
         return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe the endings of the walks and the role of the ground, or return nothing for a stage that does not
-        walk.
-        """
+        """Describe how walks ended and the role of the ground, or return nothing for a stage that simulates no walk."""
         question = self.question
         config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
