@@ -98,7 +98,7 @@ def parse_printed(text: str) -> PrintedValue | None:
     return None
 
 
-def readable(text: str) -> str:
+def check_readable(text: str) -> str:
     """Return the text of a printed value if it can be read, otherwise raise an error."""
     if len(text) > MAX_PRINTED or parse_printed(text) is None:
         comma = " (decimals follow a point)" if re.search(r"\d,\d", text) else ""
@@ -106,7 +106,7 @@ def readable(text: str) -> str:
     return text
 
 
-Printed = Annotated[Text, AfterValidator(readable)]
+Printed = Annotated[Text, AfterValidator(check_readable)]
 
 
 class CheckSource(Block):

@@ -88,6 +88,6 @@ def describe_nonzero(acting: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(words for words, value in acting.items() if value != 0.0)
 
 
-def acting_on(config: Any) -> tuple[str, ...]:
+def drives_and_springs_of(config: Any) -> tuple[str, ...]:
     """Describe the drives, hip spring and hip damper of a config's walker, or return () if it is passive."""
     return drives_of(config) + springs_of(config)

@@ -11,7 +11,7 @@ from walkerlab.config import walkers
 from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact, Footholds
-from walkerlab.config.drives import PushOff, acting_on, push_offs
+from walkerlab.config.drives import PushOff, drives_and_springs_of, push_offs
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
@@ -281,7 +281,7 @@ class Config(Block):
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             values = SimpleNamespace(**info.data)
-            if acting := acting_on(values):
+            if acting := drives_and_springs_of(values):
                 raise meaning_error(f"is for a passive compass, but this walker has {', '.join(acting)}")
             if not walkers.is_passive_compass(values):
                 raise meaning_error("is for a compass, which this walker is not")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeGuard
 from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
+from walkerlab.config.drives import MAX_LEG_SPEED, Hip, drives_and_springs_of
 from walkerlab.config.fields import Block, check_against, key, meaning_error, short_number
 from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKneedLeg, SecondStraightLeg, lock_knee
 from walkerlab.errors import ConfigError
@@ -162,7 +162,7 @@ def check_second_leg() -> Any:
         # An invalid key is missing here. Its error is reported anyway, and without it no walker can be built.
         if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
             try:
-                alike_second(cls, info.data, value)
+                double_second_leg(cls, info.data, value)
             except ValidationError as error:
                 first = error.errors()[0]
                 raise meaning_error(f"makes no leg: {'.'.join(map(str, first['loc']))} {first['msg']}") from None
@@ -171,7 +171,7 @@ def check_second_leg() -> Any:
     return field_validator("leg_2")(classmethod(makes_a_leg))
 
 
-def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
+def double_second_leg(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
     """Build the walker whose legs are both like `leg`. `values` are the keys of the walker by name."""
     second = {name: value for name, value in values.items() if name != "leg_2"}
     if getattr(leg, "type", None) is not None:
@@ -187,7 +187,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
 
 @lru_cache
 def built_second(walker: Any) -> Any:
-    return alike_second(type(walker), dict(walker), walker.leg_2)
+    return double_second_leg(type(walker), dict(walker), walker.leg_2)
 
 
 class CompassWalker(_Legged):
@@ -524,7 +524,7 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 def is_passive_compass(config: Any) -> bool:
     """Whether the config's walker is a passive compass without torso and with equal legs, as in Appendix A."""
     compass = config.walker.type == "compass" and config.walker.torso is None and config.walker.leg_2 is None
-    return bool(compass and not acting_on(config))
+    return bool(compass and not drives_and_springs_of(config))
 
 
 def leg_inertia(walker: Any) -> float:

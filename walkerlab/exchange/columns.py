@@ -21,9 +21,9 @@ from walkerlab.exchange.marker_lines import (
     find_plane,
     frozen_rows,
     refuse_running,
+    replace_unseen,
     spell_rows,
     swap_lines_back,
-    unseen_as_gaps,
 )
 from walkerlab.exchange.recording import SEGMENTS, TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
@@ -118,7 +118,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
     recording, more_notes = remove_unlikely_positions(recording, [sources[name] for name in ends], asked.min_likelihood)
     for pairs in ends.values():
-        columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
+        columns_with_gaps, unseen = replace_unseen(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
     # Frozen markers of lines are found later, marker by marker, see `body_gaps`.
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
@@ -286,7 +286,7 @@ def add_lines(
     named = {walk.sources[name]: line for name, line in lines.items()}
     off, jumps = body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
     lines = {name: (top[~off], bottom[~off]) for name, (top, bottom) in lines.items()}
-    walk = only_rows(walk, ~off)
+    walk = select_rows(walk, ~off)
     plane = find_plane(lines, walk.walks)
     refuse_running(lines, plane, source)
     angles = {name: plane.angle(line) + constants.get(name, 0.0) for name, line in lines.items()}
@@ -302,7 +302,7 @@ def add_lines(
     return replace(walk, quantities=quantities, lines=tuple(lines), doubts=doubts, gaps=gaps)
 
 
-def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
+def select_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
     """Return the samples of a walk where `rows` (samples,) is true."""
     kept = {name: values[rows] for name, values in walk.quantities.items()}
     return replace(walk, time_s=walk.time_s[rows], quantities=kept)

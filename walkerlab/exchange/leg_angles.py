@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, only_rows
+from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, select_rows
 from walkerlab.exchange.marker_lines import MAX_NAMED, spell_samples, swap_doubt, swapped_rows
 from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
@@ -127,7 +127,7 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
         )
         walk = add_doubt(walk, doubt)
         rows[:begin] = rows[end:] = False
-    return only_rows(walk, rows)
+    return select_rows(walk, rows)
 
 
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
@@ -158,7 +158,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
     kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
-    return only_rows(
+    return select_rows(
         add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
     )
 

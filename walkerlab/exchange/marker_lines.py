@@ -201,7 +201,7 @@ def stated_direction(walks: str, up: Array) -> Array:
     return np.asarray(direction[: up.size])
 
 
-def unseen_as_gaps(
+def replace_unseen(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Replace the coordinates of markers that were not seen by gaps. Also return the reasons, by column.

@@ -234,7 +234,7 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Make the drawings for which the results so far suffice. `why` is the reason that `unsettled` stages have none.
+        """Make the drawings for which the results so far suffice. `why` is why `unsettled` stages have no results.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """

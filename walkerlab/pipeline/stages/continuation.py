@@ -112,7 +112,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
         # A branch may consist of a single point if it can be followed in neither direction.
         short = MIN_REACH * question.span.size
-        isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
+        isolated += [isolated_gait(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
     answer = summary(families, question, again)
     second = question.second
@@ -439,7 +439,7 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
             yield {"period": period, "share": cells / family.regions.period.size}
 
 
-def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
+def isolated_gait(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
     """Describe a gait that cannot be followed in either direction, because the step map is discontinuous there."""
     gait = branch.points[0]
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"

@@ -302,7 +302,7 @@ def leg_labels() -> dict[str, Variable]:
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `STEP_LABELS`. Values are missing where they are NaN or lists are short."""
+    """Build variables over steps, named as in `STEP_LABELS`. NaN and the ends of short lists become missing values."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
