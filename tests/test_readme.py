@@ -17,15 +17,15 @@ BLOCKS = [block for language, block in FENCED if not language]
 
 
 def test_first_command_after_the_install_takes_seconds():
-    install = README.index("`pip install .`")
-    assert README.index("$ walkerlab fixedpoint") == min(
-        place for place in (README.find("$ walkerlab "), README.find("```\npip")) if place > install
-    )
+    after = README.partition("```\npip install .\n```\n")[2]
+    assert after.index("$ walkerlab fixedpoint") == after.index("$ walkerlab ")
+    assert after.index("$ walkerlab fixedpoint") < after.index("```\nwalkerlab")
 
 
-def test_readme_states_the_two_install_commands():
+def test_readme_says_how_to_install_repeat_the_study_and_run_the_tests():
     assert [block.strip() for block in BLOCKS] == [
-        "pip install . && walkerlab report",
+        "pip install .",
+        "walkerlab report\nwalkerlab open",
         "pip install '.[test]' && pytest",
     ]
 
@@ -36,7 +36,8 @@ def test_readme_fits_on_a_few_screens():
 
 def test_ci_runs_the_report_command_in_an_empty_folder():
     parts = dict(re.findall(r'^ +part \d+ "README: ([^"]+)" (.*)$', CHECK, re.MULTILINE))
-    assert f"{parts['install']} && {parts['walkerlab report']}" == BLOCKS[0].strip()
+    assert parts["install"] == BLOCKS[0].strip()
+    assert parts["walkerlab report"] == BLOCKS[1].splitlines()[0]
     installing = CHECK[: CHECK.index('"README: install"')].splitlines()
     assert installing[-2].strip() == 'enter_new_environment "$1" "$scratch/for-report"'
     before = CHECK[: CHECK.index('"README: walkerlab report"')]
@@ -46,7 +47,7 @@ def test_ci_runs_the_report_command_in_an_empty_folder():
 
 
 def test_ci_runs_the_test_command_verbatim():
-    assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
+    assert f'readme_test="{BLOCKS[2].strip()}"' in CHECK
     assert 'part 2700 "README: test" bash -euc "$readme_test"' in CHECK
 
 

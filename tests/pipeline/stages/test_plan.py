@@ -40,9 +40,9 @@ def content():
 def test_answer_names_the_simplest_measurement_and_the_steps_needed(content):
     text = " ".join(" ".join(str(line) for line in answer("plan", content.summary)).split())
     assert "The simplest measurement that determines every parameter in 6 steps: periods and lengths" in text
-    assert "The slope to ± 0.02 degrees: " in text
-    assert "steps of angles over time" in text
-    assert "The leg length to ± 10⁻⁹ m: 8 steps do not suffice." in text
+    assert "To determine the slope to ± 0.02 degrees, record " in text
+    assert "record angles over time of " in text
+    assert "To determine the leg length to ± 10⁻⁹ m, 8 steps do not suffice." in text
     assert "Assumed: periods measured to 0.002 s" in text
 
 

@@ -284,14 +284,14 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
     """Return a sentence about a target error, with the fewest steps that reach it."""
     entry = rows[0]["errors"][place]
     unit = UNITS_IN_WORDS.get(entry["unit"], f" {entry['unit']}")
-    wanted = f"{axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
+    purpose = f"To determine the {axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
     reached = [row for row in rows if row["errors"][place]["steps_needed"]]
     if not reached:
-        return f"The {wanted}: {format_integer(most)} steps do not suffice."
+        return f"{purpose}, {format_integer(most)} steps do not suffice."
     best = min(reached, key=lambda row: row["errors"][place]["steps_needed"])
     needed = best["errors"][place]["steps_needed"]
     steps = "1 step" if needed == 1 else f"{format_integer(needed)} steps"
-    return f"The {wanted}: {steps} of {best['measurement']}, {best['start']}."
+    return f"{purpose}, record {best['measurement']} of {steps}, starting {best['start']}."
 
 
 def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
