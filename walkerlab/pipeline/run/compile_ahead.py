@@ -97,8 +97,7 @@ PARTS: tuple[Callable[[Config], None], ...] = (
     compile_plain_systems,
     compile_lanes,
 )
-"""Functions that compile parts of the kernels of a config. The slowest come first, so that none runs alone at the end.
-"""
+"""Functions that compile parts of the kernels of a config, the slowest first."""
 
 
 def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
