@@ -376,7 +376,7 @@ def test_walker_type_that_cannot_be_imported_is_left_out_and_the_rest_works(site
 KERNEL = """
 import math
 from types import SimpleNamespace
-from walkerlab.extensions import declared, load
+from walkerlab.extensions import code_by_word, load
 from walkerlab.physics import kernel_cache
 from walkerlab.physics.ground.friction import friction_coefficient
 from walkerlab.physics.kernels import kernel
@@ -386,7 +386,8 @@ kernel_cache.watchers.append(names.append)
 def friction_at(law, slip):
     return friction_coefficient(law, slip)[0]
 def answer():
-    law = load(declared("friction")["tanh"]).from_contact(SimpleNamespace(dynamic_friction=0.5, stiction_velocity=0.1))
+    kind = load(code_by_word("friction")["tanh"])
+    law = kind.from_contact(SimpleNamespace(dynamic_friction=0.5, stiction_velocity=0.1))
     assert math.isclose(friction_at(law, 0.1), friction_coefficient(law, 0.1)[0])
     return names
 """

@@ -18,8 +18,8 @@ IMPORT = re.compile(
     r"|import(?<=\bimport)[ \t]+(?P<modules>[\w., \t]+)"
 )
 
-# Folders that do not count as data. In a wheel, the built-in configs are inside the package, but a stage's key already
-# contains the part of the config that the stage reads. Machine code gives the same results as its sources.
+# Folders that do not count as data. In a wheel, the built-in configs are inside the package, but the key of a stage
+# already contains the part of the config that the stage reads. Machine code gives the same results as its sources.
 INPUT_FOLDERS = ("config/builtin", "physics/machine_code")
 
 

@@ -1,6 +1,6 @@
 """Extensions: packages that add stages, figures, sections of the page, answers, laws and studies.
 
-The package's own extensions are listed in `walkerlab.EXTENSIONS`; other packages announce theirs by entry points of the
+The built-in extensions are listed in `walkerlab.EXTENSIONS`. Other packages announce theirs by entry points of the
 group `walkerlab.extensions`. An extension names its code in quotes, "module:name", which is imported on first use. All
 other modules ask this one for what extensions add, so none of them names a module of a higher layer.
 """
@@ -48,7 +48,7 @@ class Study:
     """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
 
     own_walker: str  # function that tells whether a config has the walker of the study
-    # functions that change a rigid model, by value of the config key
+    # functions that give a rigid model other equations, by value of the config key `equations`
     equations: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -69,7 +69,7 @@ class Extension:
     studies: Sequence[Study] = ()
 
     def words(self, key: str) -> Mapping[str, str]:
-        """Return the code that the extension adds under words of a config key, by word."""
+        """Return the code that the extension adds for words of a config key, by word."""
         if key == "equations":
             return {word: code for study in self.studies for word, code in study.equations.items()}
         return dict(getattr(self, key))
@@ -95,7 +95,7 @@ class Found:
 
     name: str
     code: str  # module:name
-    source: str  # distribution and version; empty for the package's own
+    source: str  # distribution and version; empty for built-in extensions
     extension: Extension | None = None  # None if it is left out
     reason: str = ""  # reason why it is left out
 
@@ -172,14 +172,14 @@ def extensions() -> dict[str, Extension]:
     return {found.name: found.extension for found in registry() if found.extension is not None}
 
 
-def declared(kind: str) -> dict[str, str]:
-    """Return the code that all extensions declare in a field that is a mapping, or for values of a config key."""
+def code_by_word(kind: str) -> dict[str, str]:
+    """Return the code that all extensions add, by name. `kind` is a field of `Extension`, or a config key."""
     return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
 
 
 def words(key: str) -> tuple[str, ...]:
     """Return all values that a config key allows: the built-in ones, then those of extensions."""
-    return (*WORDS[key], *declared(key))
+    return (*WORDS[key], *code_by_word(key))
 
 
 def external_extensions() -> tuple[Found, ...]:
@@ -229,7 +229,7 @@ def versions() -> str:
 
 
 def refuse_other_versions(expected: str) -> None:
-    """Raise ConfigError in a worker if the `versions` of its caller differ from its own."""
+    """Raise ConfigError in a worker if its extensions differ from those of the caller, `expected` (see `versions`)."""
     if expected != versions():
         have = f"this worker has the extensions [{versions()}], and its caller [{expected}]."
         raise ConfigError(have, "Install the same in both environments; `walkerlab extensions` lists them.")
@@ -241,7 +241,7 @@ def announced() -> Iterator[tuple[str, str, str]]:
     Importing importlib.metadata and reading all distributions takes longer than many commands, so the entries of a
     folder are read again only after it has changed.
     """
-    # `os.path` instead of `Path`, which raises an error if the user has no home
+    # `os.path`, because `Path` raises an error if the user has no home.
     cache = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache")  # noqa: PTH111
     cache_file = Path(cache) / "walkerlab-extensions.json"
     stored = read_scans(cache_file)
@@ -254,7 +254,7 @@ def announced() -> Iterator[tuple[str, str, str]]:
         if stored.get(folder, [0])[0] != stamp:
             stored[folder], changed = [stamp, scan(folder)], True
         for distribution, version, name, code in stored[folder][1]:
-            # Of two installations of a distribution, Python imports the one whose folder comes first.
+            # A distribution may be installed twice. Python imports the one whose folder comes first.
             if (distribution, name) not in seen:
                 seen.add((distribution, name))
                 yield name, code, f"{distribution} {version}"
@@ -266,7 +266,7 @@ def scan(folder: str) -> list[list[str]]:
     """List the entry points of the distributions in a folder: distribution, version, name and code."""
     if not any(entry.endswith((".dist-info", ".egg-info")) for entry in os.listdir(folder)):  # noqa: PTH208
         return []
-    # imported here because it takes 40 ms
+    # Imported here, because it takes 40 ms.
     from importlib.metadata import distributions
 
     entries = []

@@ -21,7 +21,7 @@ ERROR_OF_EACH_STEP: Final = {
     "rolling_m": "rolling_m",
     "knee_strike_times_s": "knee_strike_time_s",
 }
-"""Per-step quantities in a walk's summary, and their names in its `numerical_error`."""
+"""Quantities of each step in the summary of a walk, and their names in `numerical_error`."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Outcome(IntEnum):
-    """Outcome of a walk. Kernels return its integer."""
+    """Outcome of a walk. Kernels return the integer value."""
 
     WALKED = 0
     FELL = 1

@@ -19,20 +19,20 @@ def is_foreign(path: Path) -> bool:
 
 
 def may_be_foreign(path: Path) -> bool:
-    """Whether another user, except root, may have written a file or a folder. Links may lead to one, so they count."""
+    """Whether another user, except root, may have written a file or a folder. Links count, as they may lead to one."""
     mode = path.lstat().st_mode
     return is_foreign(path) or stat.S_ISLNK(mode) or bool(mode & stat.S_IWOTH)
 
 
 def make_private_folder(folder: Path) -> None:
     """Create a folder, and parents that do not exist, for this user alone."""
-    # `mkdir` with parents would give the parents the usual permissions.
+    # `mkdir` with `parents=True` would not make the parents private.
     for each in (*reversed(folder.parents), folder):
         each.mkdir(0o700, exist_ok=True)
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder with its content, to other users. Delete and return everything they may have written.
+    """Close a file, or a folder and everything in it, to other users. Delete and return what they may have written.
 
     Raises OSError if such a file cannot be deleted.
     """

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.config.drives import Hip, acting_on, drives_of, springs_of
+from walkerlab.config.drives import Hip, drives_and_springs_of, drives_of, springs_of
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 
@@ -31,7 +31,7 @@ def test_invalid_drives_are_rejected(asked):
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "parts"])
 def test_walkers_of_every_type_can_be_driven(name):
     sets = (PUSH, "walker.hip.spring_N_m_per_rad=0.01", "walker.hip.damping_N_m_s_per_rad=0.02")
-    assert acting_on(load(Path(name)).config) == ()
+    assert drives_and_springs_of(load(Path(name)).config) == ()
     driven = load(Path(name), sets).config
     assert drives_of(driven) == ("a push-off of 0.1 N s",)
     assert springs_of(driven) == ("a hip spring of 0.01 N m/rad", "a hip damper of 0.02 N m s/rad")
@@ -39,4 +39,4 @@ def test_walkers_of_every_type_can_be_driven(name):
 
 @pytest.mark.parametrize("number", [name for name, field in Hip.model_fields.items() if field.default == 0.0])
 def test_every_hip_parameter_has_a_description(number):
-    assert len(acting_on(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1
+    assert len(drives_and_springs_of(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1

@@ -107,7 +107,7 @@ def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def stated_keys(keys: Mapping[str, object]) -> dict[str, Setting]:
-    """Return the keys that a caller passed. None leaves a key at its default."""
+    """Return the keys that a caller passed, without those that are None, which keep the default."""
     return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
 
 
@@ -115,7 +115,7 @@ def walker(type: str, **keys: Setting) -> Walker:
     """Build the config block of a walker.
 
     type  type of the walker
-    keys  keys of the config's block `walker`, in the units that their names end in; omitted ones have their defaults
+    keys  keys of the config's block `walker`, in the units at the end of their names; omitted keys have their defaults
 
     Returns the block, an argument of the functions below. Raises ConfigError for a key or value that the type does not
     allow.
@@ -183,8 +183,8 @@ def find_gait(walker: Walker | None = None, slope_deg: float | None = None, **ke
     slope_deg  slope in deg, positive downhill
     keys       other config keys, such as gravity_m_s2, equations, seed
 
-    Returns a result whose `summary` has the chosen gait, and whose arrays have all gaits, one a row; `no_answer` says
-    why there is none. Raises ConfigError for values that are not allowed.
+    Returns a result whose `summary` has the chosen gait and whose arrays have a row for each gait. If there is no gait,
+    `no_answer` says why. Raises ConfigError for values that are not allowed.
 
     >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
     >>> gait.stable, round(gait.period_s, 4)
@@ -300,7 +300,7 @@ def design(walker: Walker | None = None, over: Mapping[str, Setting] | None = No
 
     walker  built by `compass`, `kneed` or `walker`
     over    bounds (low, high) of the parameters to vary, in the key's unit
-    keys    minimise or maximise, keep (bounds of other gait quantities), model, starts; other config keys
+    keys    minimise or maximise, keep (bounds of other gait quantities), model or starts, or other config keys
 
     Returns a result whose `summary` has the best values by key, and the quantity before and after. Raises ConfigError
     for values that are not allowed.
@@ -327,7 +327,7 @@ def read_walk(
     units      units by kind, quantity or column, if the file does not state them, such as {"angle": "deg"}
     walker     walker that made the recording, built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
-    keys       other keys of the block `recording`, such as walks, camera_tilt_deg or fps; other config keys
+    keys       other keys of the block `recording`, such as walks, camera_tilt_deg or fps, or of the config
 
     Returns a result whose `summary` has the steps, and whose arrays have a row for each step and each sample. Raises
     ConfigError for a file without a walk.
@@ -358,7 +358,7 @@ def identify(
     prior   known value and standard deviation, by key
     keys    other keys of the block `identify`, such as level, model, nuisance
 
-    Returns a result whose `summary["estimates"]` has one row for each parameter; if the fit does not converge,
+    Returns a result whose `summary["estimates"]` has one row for each parameter. If the fit does not converge,
     `no_answer` has the reason. Raises ConfigError for invalid arguments or files.
 
     >>> walk = simulate(slope_deg=3, strides=4, start=[None, 0.225, -0.37, -1.1])
@@ -367,7 +367,7 @@ def identify(
     3.0
     """
     if isinstance(walk, Mapping):
-        # Columns take the same way as a file, so that both have the same checks and messages.
+        # Columns are written to a file, so that they have the same checks and messages as a file.
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "walk.csv"
             path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))
@@ -416,7 +416,7 @@ def plan_measurements(
     model   rigid or contact
     keys    keys of the block `plan`, such as steps, max_steps, errors, period_noise_s
 
-    Returns a result whose `summary["measurements"]` has the expected standard errors of each way to measure; if the
+    Returns a result whose `summary["measurements"]` has the expected standard errors of each way to measure. If the
     walk ends too early, `no_answer` has the reason. Raises ConfigError for invalid arguments.
 
     >>> plan = plan_measurements("slope-3deg", ["slope_deg"], steps=4, max_steps=4)
@@ -488,7 +488,7 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
         if not isinstance(scene[name], kinds):
             raise ConfigError(f"{name}: {scene[name]!r} is not a {name} block.", makers)
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
-    # The paper's source is wrong for another scene, and keys of its walker would be merged into those of another type.
+    # The paper is not the source of another scene, and keys of its walker would be merged into those of another type.
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.copy_without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])

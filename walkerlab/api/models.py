@@ -36,7 +36,7 @@ def export_model(
 ) -> tuple[Path, ...]:
     """Write a walker, started on its gait, as a model for ADAMS (.adm, .cmd) or MuJoCo (.xml).
 
-    path       file of the model; commands (.acf) for an .adm model, or the script of a driven or kneed walker, are
+    path       file of the model. Commands (.acf) for an .adm model, or the script of a driven or kneed walker, are
                written next to it
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
@@ -102,7 +102,7 @@ def mujoco_model(
         gait, config = config, _config_of(config)
     start = config.config if isinstance(config, Run) else config
     scene = add_blocks(start, **{name: plain(value) for name, value in blocks.items()})
-    # Changed keys may change the gait, which is then found anew.
+    # If the changed keys change the gait, it has to be found again.
     if isinstance(start, Config) and _identity_of_gait(start) != _identity_of_gait(scene):
         gait = None
     text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None, gait).values()))
@@ -127,7 +127,7 @@ def _identity_of_gait(config: Config) -> Identity:
 def _export_texts(
     config: Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
 ) -> dict[str, str]:
-    """Return a model's files by name. Find its gait first if `gait` is None."""
+    """Return the texts of the files of a model by name. If `gait` is None, the gait is found first."""
     from walkerlab.exchange import export
     from walkerlab.exchange.exported import GaitStart
     from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry

@@ -38,7 +38,7 @@ Setting: TypeAlias = "Value | Block | NDArray[np.generic] | np.generic | Sequenc
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """Result of a stage. Its repr shows the headline values, and notebooks show its answer with tables.
+    """Result of a stage. `repr` shows the headline values, and notebooks show the answer with tables.
 
     Each value of the summary is also an attribute and an item.
 
@@ -64,7 +64,7 @@ class Result:
     artifact: Path | None = None
 
     def __getattr__(self, name: str) -> Value:
-        # Python asks for attributes such as __deepcopy__ before there is a summary.
+        # Python asks for attributes such as __deepcopy__ before there is a summary, for example to restore a copy.
         if name.startswith("_"):
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
         if name not in self._values:
@@ -105,7 +105,7 @@ class Result:
         return "\n".join([f"{type(self).__name__} of {self.stage}", *lines])
 
     def _repr_html_(self) -> str:
-        # Imported here: only notebooks show HTML.
+        # Imported here, because only notebooks show HTML.
         from walkerlab.views.report.answers import answer_html
 
         if self.no_answer is not None:
@@ -148,7 +148,7 @@ class Result:
     def to_dataframe(self, group: str = "") -> DataFrame:
         """Return a group of arrays, by default the first, as a pandas DataFrame. `attrs["units"]` has units by column.
 
-        Its index is made of the dimensions that all arrays share; others give columns such as `angle.1`.
+        The index is made of the dimensions that all arrays share. Other dimensions give columns such as `angle.1`.
 
         Raises KeyError for an unknown group, ConfigError if pandas is not installed.
 
@@ -176,7 +176,7 @@ class Result:
         return tuple(self._drawable())
 
     def _drawable(self) -> dict[str, Illustration]:
-        # Imported here: it loads matplotlib.
+        # Imported here, because it loads matplotlib.
         from walkerlab.views.figures.stage import FIGURES
 
         results = {self.stage: cast(Identified, self.content)}

@@ -143,8 +143,8 @@ def run(
     force    run the stage and all that it needs, even if their results are current
     jobs     maximum number of processes
 
-    Returns the stored result; if the computation has no answer, its `no_answer` has the reason. Raises ConfigError for
-    an invalid config, StorageError if the result cannot be stored.
+    Returns the stored result. If the computation has no answer, `no_answer` has the reason. Raises ConfigError for an
+    invalid config, StorageError if the result cannot be stored.
 
     >>> gait = run("fixedpoint", set={"slope_deg": 3}, runs=folder)
     >>> round(gait.summary["period_s"], 4)
@@ -161,7 +161,7 @@ def run(
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
-    """Open a stored run by its name in the folder `runs`, or by the path of its own folder.
+    """Open a stored run by its name in the folder `runs`, or by the path of its folder.
 
     name  name of the run, or path of its folder
     runs  folder that holds all runs
@@ -199,9 +199,9 @@ def sweep(
     jobs      number of chunks to compute in parallel; 0 lets the engine choose
     combined  zip, sample and seed, see `Combined`; by default the values form the full grid
 
-    Returns a Dataset with a dimension for each key; with zip or sample, with one dimension, `point`. Raises NoAnswer if
-    points could not be computed, or WalkerlabError if a bug is among the reasons. The other points are stored;
-    `open_run` reads them.
+    Returns a Dataset with a dimension for each key or, with zip or sample, with the single dimension `point`. Raises
+    NoAnswer if points could not be computed, or WalkerlabError if a bug is among the reasons. The other points are
+    stored, and `open_run` reads them.
 
     >>> gaits = sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=folder, jobs=1)
     >>> [round(float(period), 4) for period in gaits.period_s]
@@ -259,7 +259,7 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
 
     Raises ConfigError for anything else.
     """
-    # Imported late: few callers sweep.
+    # Imported here, because few callers sweep.
     from walkerlab.pipeline.sweeps.question import MAX_POINTS
 
     if isinstance(values, str) and not values.lstrip().startswith("["):

@@ -10,7 +10,7 @@ from walkerlab.outcome import Outcome
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
-MAX_BOUND: Final = 1e6  # limit of the window's bounds
+MAX_BOUND: Final = 1e6  # largest magnitude of the window's bounds
 
 _COORDINATE_UNITS: Final = "rad, rad/s"
 _WIDTH: Final = "the gait by 0.15 rad and 0.25 sqrt(g/L)"
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
         """Range of values, with the keys `from` and `to`."""
 
 else:
-    # `from` is a keyword of Python, so a class body cannot declare it
+    # `from` is a keyword of Python, so a class body cannot declare a key of this name.
     _Span = create_model(
         "_Span",
         __base__=Block,
@@ -216,7 +216,7 @@ class Robustness(Block):
     """Disturbances and parameters of `walkerlab robustness`."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
-        None, "", "model that is simulated", default_in_words="both, rigid where there is no contact block"
+        None, "", "model that is simulated", default_in_words="both, or rigid if there is no contact block"
     )
     to: tuple[str, ...] | None = key(
         None,

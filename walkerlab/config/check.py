@@ -47,7 +47,7 @@ class PrintedValue:
 
 
 def digits_of(text: str) -> Digits:
-    """Read a number with its digits, such as '-.50' (2 digits, unit 0.01)."""
+    """Read a printed number with its digits: '-.50' has 2 digits, the last one of unit 0.01."""
     mantissa, _, exponent = text.lstrip("+-").partition("e")
     scale = int(exponent or 0) - len(mantissa.partition(".")[2])
     figures = mantissa.replace(".", "").lstrip("0")
@@ -55,14 +55,14 @@ def digits_of(text: str) -> Digits:
 
 
 def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
-    """Return how a right value agrees with all printed digits: 'rounded', 'cut off', or '' if it does not.
+    """Return how the printed digits follow from the right value: 'rounded', 'cut off', or '' if they do not.
 
     error  numerical error of the right value
     """
     if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
         return "rounded"
     longer = abs(right) - abs(printed.value)
-    # A value that is cut off to zero has lost its sign.
+    # A value that is cut off to zero is printed without its sign.
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
     return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
 
@@ -98,15 +98,15 @@ def parse_printed(text: str) -> PrintedValue | None:
     return None
 
 
-def readable(text: str) -> str:
-    """Validate a printed value."""
+def check_readable(text: str) -> str:
+    """Return the text of a printed value if it can be read, otherwise raise an error."""
     if len(text) > MAX_PRINTED or parse_printed(text) is None:
         comma = " (decimals follow a point)" if re.search(r"\d,\d", text) else ""
         raise meaning_error(f"is not a printed value{comma}: give {FORMS}, without its unit")
     return text
 
 
-Printed = Annotated[Text, AfterValidator(readable)]
+Printed = Annotated[Text, AfterValidator(check_readable)]
 
 
 class CheckSource(Block):
@@ -125,7 +125,7 @@ if TYPE_CHECKING:
         """Declaration of the key `from`."""
 
 else:
-    # `from` is a keyword of Python, so a class body cannot declare it
+    # `from` is a keyword of Python, so a class body cannot declare a key of this name.
     _From = create_model("_From", __base__=Block, **{"from": (Literal["vertical", "slope-normal"], _FROM)})
 
 

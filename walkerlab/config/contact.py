@@ -1,5 +1,5 @@
-"""The contact block (values in N, mm, s as in ADAMS dialogs or in SI, and their conversion) and the ground block, the
-heights of footholds above the slope.
+"""The blocks `contact` and `ground`: contact laws in N, mm, s as in ADAMS dialogs or in SI, and heights of footholds
+above the slope.
 """
 
 from collections.abc import Mapping
@@ -107,7 +107,7 @@ class Contact(Block):
         if not isinstance(data, dict) or data.get("units") != "si":
             return data
         exponent = data.get("exponent", 2.2)
-        # An invalid exponent is reported later.
+        # An invalid exponent is reported when the schema is checked. Until then any valid one will do.
         power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data
@@ -139,7 +139,7 @@ class Contact(Block):
         return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
-        """Return the unit in use from a pair of units such as `mm or m`."""
+        """Return the one of two units, such as `mm or m`, that belongs to the system of units of this block."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def to_si(self) -> Self:

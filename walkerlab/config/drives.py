@@ -10,7 +10,8 @@ from walkerlab.extensions import WORDS, origin_of, words
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
 LINEAR: Final = WORDS["hinge_law"][0]
-MAX_LEG_SPEED: Final = 1e4  # rad/s, to which hip torques may drive a leg; excludes nearly massless legs
+# rad/s. Hip torques that could drive nearly massless legs faster are refused, because integration would take forever.
+MAX_LEG_SPEED: Final = 1e4
 
 
 class Hip(Block):
@@ -37,11 +38,11 @@ class Hip(Block):
 
     @property
     def parameters(self) -> tuple[float, float, float]:
-        """Parameters of the law, in its order."""
+        """Parameters of the hinge law, in the order of its arguments."""
         return self.spring_N_m_per_rad, self.damping_N_m_s_per_rad, self.torque_N_m
 
     def too_quick_for(self, inertia: float) -> bool:
-        """Whether the torques would swing a leg with this inertia about the hip (kg m^2) too fast to integrate."""
+        """Whether the torques would swing a leg of this `inertia` about the hip (kg m^2) too fast to integrate."""
         steady = max(self.spring_N_m_per_rad, abs(self.torque_N_m))
         return steady > MAX_LEG_SPEED**2 * inertia or self.damping_N_m_s_per_rad > MAX_LEG_SPEED * inertia
 
@@ -63,7 +64,7 @@ def push_offs(push_off: Any) -> tuple[float, float]:
 
 
 def drives_of(config: Any) -> tuple[str, ...]:
-    """Describe the drives that supply energy to a config's walker."""
+    """Describe the drives of a config that supply energy to its walker."""
     first, second = push_offs(config.push_off)
     push = f"{short_number(first)} N s{'' if first == second else f' by leg 1 and {short_number(second)} N s by leg 2'}"
     torque = config.walker.hip.torque_N_m
@@ -87,6 +88,6 @@ def describe_nonzero(acting: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(words for words, value in acting.items() if value != 0.0)
 
 
-def acting_on(config: Any) -> tuple[str, ...]:
+def drives_and_springs_of(config: Any) -> tuple[str, ...]:
     """Describe the drives, hip spring and hip damper of a config's walker, or return () if it is passive."""
     return drives_of(config) + springs_of(config)

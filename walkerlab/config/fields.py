@@ -18,15 +18,13 @@ from pydantic_core import PydanticCustomError
 from walkerlab.labels import add_unit
 
 RELATIVE_ROUNDING: Final = 1e-9
-"""Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
+"""Maximum relative difference of numbers that count as equal. It exceeds the rounding of unit conversions."""
 
 DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
 
 def short_number(number: float) -> str:
-    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6. Integers are
-    written in full.
-    """
+    """Return the shortest text that reads back as the finite `number`, e.g. 3, 0.0174, 1e6. Integers are in full."""
     if isinstance(number, int):
         return str(number)
     plain = repr(number).removesuffix(".0")
@@ -107,9 +105,7 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """Return the type of the block that a key holds (the first kind if there are several), or None if it
-    holds a value.
-    """
+    """Return the type of the block that a key holds, the first of several kinds, or None if the key holds a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -117,7 +113,7 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """Return the types of block that a key may hold, by the block's key `type`. It is empty if there is at most one."""
+    """Return the types of block that a key may hold by the block's key `type`, or nothing if there is only one."""
     kinds = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
@@ -131,7 +127,7 @@ def leaves(
 ) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
     """Yield path and field of every value in `block`, in the schema's order.
 
-    held  instance of `block` that selects the kind of each inner block; by default the first kind
+    held  instance of `block`, whose inner blocks select the kinds to list; by default the first kind of each
     """
     for name, field in block.model_fields.items():
         inner = block_of(field)
@@ -143,7 +139,7 @@ def leaves(
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Yield path and field of the values in all but the first kind of block, e.g. `walker(kneed).thigh.length_m`."""
+    """Yield path and field of the values that `leaves` omits, e.g. `walker(kneed).thigh.length_m`."""
     for name, field in block.model_fields.items():
         for tag, kind in list(kinds_of(field).items())[1:]:
             yield from leaves(kind, (f"{name}({tag})",))

@@ -34,7 +34,7 @@ class ConfigFile:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path is a file. A path that the system refuses, such as one that is too long, is not."""
+    """Whether a path is a file. Return False for a path that the system refuses, such as one that is too long."""
     try:
         return path.is_file()
     except OSError:
@@ -89,7 +89,7 @@ def read_layers(file: ConfigFile) -> list[BlockNode]:
 
 
 def files_read(file: ConfigFile) -> list[Path]:
-    """List the files that a config is read from: its own, the files it extends, and files with stability cases."""
+    """List the files that a config is read from: its file, the files it extends, and files with stability cases."""
     paths = []
     for layer_file, root in files_and_blocks(file):
         cases = cases_file(root, layer_file.path.parent)
@@ -98,7 +98,7 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]:
-    """Yield (file, block of keys) of a config, then of each file it extends. Raises the errors of `read_layers`."""
+    """Yield a config file with its block of keys, then the files it extends. Raises the errors of `read_layers`."""
     seen: list[str] = []
     reference: Position | None = None  # position of the file's name in the config that extends it
     while True:
@@ -136,9 +136,7 @@ def _refuse_named_files(root: BlockNode) -> None:
 
 
 def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file under stability.cases (relative to `folder`) and where the config names it, or None
-    for a list.
-    """
+    """Return the file that stability.cases names (relative to `folder`) and the position of the name, or None."""
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, BlockNode) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
@@ -234,7 +232,7 @@ def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
     _refuse_two_slopes(merged.keys)
     for layer in layers[1:]:
         _refuse_two_slopes(layer.keys)
-        # The name belongs to one file. A file that extends it is another run.
+        # A config that extends another one is another run, so it does not inherit the name.
         lower = merged.copy_without("name")
         # A slope in degrees replaces one in radians of a lower layer, and the other way round.
         if any(name in layer.entries for name in SLOPE_KEYS):
@@ -266,7 +264,7 @@ def parse_setting(text: str) -> ConfigSetting:
 
     Raises ConfigError if it is not KEY=VALUE with a YAML value.
     """
-    # If the text has an attribute `source`, it is the option's name in messages.
+    # A text with an attribute `source` is of another option than --set, whose name messages must show.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -300,7 +298,7 @@ def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockN
 
 
 def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
-    """Place a setting in a copy of a block. `copies` holds, by id, the copies that earlier settings made."""
+    """Return a copy of a block with a setting in it. `copies` holds, by id, the copies that earlier settings made."""
     result = copies.get(id(block)) or block.copy_without()
     copies[id(result)] = result
     name = setting.path[depth]

@@ -25,13 +25,13 @@ from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
 IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
-"""Steeper than any slope on which passive walkers are known to walk; a larger value is perhaps in degrees."""
+"""Steeper than any slope on which passive walkers are known to walk. A larger value is perhaps in degrees."""
 IMPLAUSIBLE_LENGTH_M: Final = 20.0
-"""Longer than the legs of any real walker; a larger value is perhaps in millimetres."""
+"""Longer than the legs of any real walker. A larger value is perhaps in millimetres."""
 IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
-"""Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
+"""Stronger than the gravity of any planet in the solar system. A larger value is perhaps in cm/s^2."""
 WATER_KG_M3: Final = 1000.0
-"""Density of water; a mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
+"""Density of water. A mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class LoadedConfig:
 
     @property
     def base(self) -> Config:
-        """The config without settings."""
+        """The config without the changes by `--set` and `--strides`."""
         return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
     def add_position(self, error: ConfigError) -> ConfigError:
@@ -127,9 +127,7 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: a leg mass that did not move with its leg, wrong units, a pitch without
-    pads.
-    """
+    """Yield warnings about likely mistakes: wrong units, a pitch without pads, a mass not moved with its leg."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
@@ -180,7 +178,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List each key in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg replaces slope_rad."""
+    """List the keys in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg stands for slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
@@ -190,7 +188,7 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
     differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
-    # If a block was null, a null key in it is no change.
+    # A key that is null in a new block is no change if the block was null before.
     absent = {f"{key}." for key, value in values_before.items() if value is None}
     differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:
@@ -224,9 +222,9 @@ def _word(value: Any) -> str:
 
 
 def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes (nested keys with values). Error messages name their `source`.
+    """Build the paper config with changes. `lines` are nested keys with values, whose `source` error messages name.
 
-    Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
+    A start is moved onto its constraints without a warning. Raises ConfigError if the result is invalid.
     """
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
@@ -236,7 +234,7 @@ def paper_config_with_tree(upper: BlockNode) -> Config:
 
     Raises ConfigError with positions if the result is invalid.
     """
-    # With SI units, keys missing in the contact block keep the paper's physical value, not its number in N, mm, s.
+    # With SI units, missing keys of the contact block keep the physical values of the paper, not the numbers.
     layers = files.read_layers(files.builtin_config(files.DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, BlockNode) else None

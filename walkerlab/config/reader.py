@@ -1,6 +1,6 @@
 """Parser that converts YAML to trees with positions.
 
-ruamel.yaml splits the input; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no`
+ruamel.yaml splits the input. Plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no`
 is a string. Anchors, aliases, tags, duplicate keys, deep nesting and very long input are errors, so that the cost of
 parsing is proportional to the length of the input.
 """
@@ -34,7 +34,7 @@ def value_of(text: str) -> str | int | float | bool | None:
     """Convert a plain scalar to a value by the rules of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
-    # Python takes quadratic time to convert a long integer.
+    # Longer integers stay text, because Python takes quadratic time to convert them.
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text)
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
@@ -47,7 +47,7 @@ def value_of(text: str) -> str | int | float | bool | None:
 def read(text: str, source: str, column: int = 1) -> Node | None:
     """Parse the text of a single document to a tree, or return None if it is empty.
 
-    Positions name the `source` (a file or option); `column` is the column at which the text starts. Raises ConfigError
+    Positions name the `source` (a file or option). `column` is the column at which the text starts. Raises ConfigError
     with the position of anything that is not plain YAML.
     """
     if len(text) > MAX_CHARACTERS:
@@ -69,7 +69,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
-        # The parser's own message only says that the character cannot start a token.
+        # The message of the parser only says that the character cannot start a token.
         if r"'\t'" in str(reason):
             raise problem_error(where, "a tab: YAML is indented by spaces", advice="Replace tabs by spaces.") from None
         raise problem_error(where, f"not YAML: {printable(str(reason))}") from None

@@ -12,7 +12,7 @@ from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Protocol
 
-# The command line's help uses types of this module and must load neither the schema nor pydantic.
+# The help of the command line uses types of this module. Loading the schema and pydantic would slow it down.
 if TYPE_CHECKING:
     from walkerlab.config import schema
     from walkerlab.config.analyses import Basin, Case, Continuation, Design, Plan, Robustness
@@ -35,7 +35,7 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # config blocks, which are not Protocols, are read completely
+    # Config blocks are not Protocols and are read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
@@ -164,7 +164,7 @@ class OwnCases(Protocol):
 
 
 class CompassCasesConfig(Protocol):
-    """Keys that `stability` reads for the paper's compass. Its cases are variations of the paper's config."""
+    """Keys that `stability` reads for the compass of the paper. The cases are variations of the paper's config."""
 
     @property
     def walker(self) -> Walker: ...
@@ -175,7 +175,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for a walker other than the paper's. Its extreme cases vary its own scene."""
+    """Keys that `stability` reads for a walker other than the paper's. Its scene is varied by the extreme cases."""
 
     @property
     def stability(self) -> OwnCases: ...
@@ -285,7 +285,7 @@ def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> 
 
 
 def canonical_json(data: Any) -> str:
-    """Serialise so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
+    """Return JSON that is the same for equal content: sorted keys, no blanks, ASCII, shortest floats.
 
     Raises ValueError if a number is not finite.
     """

@@ -11,7 +11,7 @@ from walkerlab.config import walkers
 from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact, Footholds
-from walkerlab.config.drives import PushOff, acting_on, push_offs
+from walkerlab.config.drives import PushOff, drives_and_springs_of, push_offs
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
@@ -54,7 +54,7 @@ class SlopeInDegrees(Block):
 SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
 StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
-# null in place of an angle or rate that follows from the others
+# An angle or rate that follows from the others may be null.
 State = tuple[SwingAngle | None, StanceAngle, Rate, Rate]
 LongState = tuple[Rate | None, ...]  # states of walkers with more bodies than two legs
 
@@ -85,7 +85,7 @@ def replace_state(start: Any, state: tuple[float, ...]) -> Any:
 
 
 def kind_of_start(value: Any) -> str:
-    """Return the union tag of a `start` value: its kind of state, or word."""
+    """Return the tag by which pydantic chooses the type of a `start` value: a kind of state, or a word."""
     if isinstance(value, list | tuple):
         return "state" if len(value) <= 4 else "long"
     return MID_STEP if isinstance(value, dict | MidStep) else "word"
@@ -281,7 +281,7 @@ class Config(Block):
     def _appendix_a_is_a_compass(cls, value: Equations, info: ValidationInfo) -> Equations:
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             values = SimpleNamespace(**info.data)
-            if acting := acting_on(values):
+            if acting := drives_and_springs_of(values):
                 raise meaning_error(f"is for a passive compass, but this walker has {', '.join(acting)}")
             if not walkers.is_passive_compass(values):
                 raise meaning_error("is for a compass, which this walker is not")

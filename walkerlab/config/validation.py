@@ -54,7 +54,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-FAR_OFF: Final = 0.01  # rad or rad/s; a start is rejected if one of its stated values is off by more than this
+MAX_START_ERROR: Final = 0.01  # rad or rad/s; a start is rejected if a stated value is off by more than this
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
@@ -72,9 +72,9 @@ def validate_tree(tree: BlockNode) -> Config:
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
     if isinstance(check := tree.entries.get("check"), BlockNode):
-        # In a printed value the zeros at its end count, too.
+        # The zeros at the end of a printed value count, but conversion to a number would drop them.
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
-    # The schema has only slope_rad, so a slope in degrees has a model of its own.
+    # The schema has only slope_rad. A slope in degrees is validated by another model and then converted.
     if "slope_deg" in data:
         degrees = data.pop("slope_deg")
         try:
@@ -92,7 +92,7 @@ def validate_tree(tree: BlockNode) -> Config:
 
 
 class FollowingValue(NamedTuple):
-    """Value of a start that follows from others."""
+    """Value of a start that can be computed from others."""
 
     name: str
     value: float
@@ -118,11 +118,11 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
             raise problem_error(where, f"start: value {place + 1} is null, but only {names} can be computed here")
     for place, (name, value, unit, because) in following.items():
         before, start[place] = stated[place], value
-        # Rounding of a stated value needs no remark.
+        # A stated value that was only rounded needs no remark.
         if before is None or abs(value - before) <= MOVED_RAD:
             continue
         change = f"start: {name} {{}} {fields.short_number(before)} {{}} {fields.short_number(value)} {unit}, {because}"
-        if abs(value - before) > FAR_OFF:
+        if abs(value - before) > MAX_START_ERROR:
             as_it_is = ", ".join("null" if each is None else fields.short_number(each) for each in stated)
             midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
@@ -137,7 +137,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
 
 
 def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
-    """Return the values of a start that follow from others, by index.
+    """Return the values of a start that can be computed from others, by index.
 
     Just after a heel strike both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
     for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
@@ -219,7 +219,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         allowed = f"one of {', '.join(kinds)}{advise_extensions()}"
         return Problem(position, text, allowed, "" if beyond else nearest(word, kinds))
-    # Pydantic inserts the kind of value that it tried into the location of an error.
+    # Pydantic inserts the kind of value that it tried into the location, where the config has no key.
     if len(location) > 1 and location[1] in (*kinds, MID_STEP):
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
@@ -294,7 +294,8 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     if any(name in kind.model_fields for kind in kinds.values()):
         return _keys_of_another_kind(".".join(above), parent, parent.keys[name].source, block, kinds)
     if location == ("extends",):
-        return Problem(parent.keys[name], "extends: belongs in a file, not in --set", "-c FILE with `extends` in it")
+        allowed = "put `extends` in a file and pass it with -c"
+        return Problem(parent.keys[name], "extends: belongs in a file, not in --set", allowed)
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
     text = f"{printable('.'.join((*above, name)))}: unknown key ({format_node(parent.entries[name])})"
     value = parent.entries[name]
@@ -332,9 +333,9 @@ def _keys_of_another_kind(
 
 
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
-    """Return the path of the key with the nearest name (`exactly`: the same name) in any block, or an empty string."""
+    """Return the path of the key with the nearest name in any block, or with the same name if `exactly`, or ''."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(Config)))}
-    # The nearest name to a dotted one is looked for among whole paths.
+    # A dotted name is compared with whole paths.
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
@@ -343,7 +344,7 @@ def _find_key_elsewhere(name: str, exactly: bool) -> str:
 
 
 def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:
-    """Return the value at a location and its position. For a missing key, they are None and the position of its block.
+    """Return the value at a location, and its position. For a missing key, return None and the position of its block.
 
     Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
     """

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeGuard
 from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
+from walkerlab.config.drives import MAX_LEG_SPEED, Hip, drives_and_springs_of
 from walkerlab.config.fields import Block, check_against, key, meaning_error, short_number
 from walkerlab.config.second_leg import KneelessLeg, SecondCompassLeg, SecondKneedLeg, SecondStraightLeg, lock_knee
 from walkerlab.errors import ConfigError
-from walkerlab.extensions import declared, load
+from walkerlab.extensions import code_by_word, load
 
 WISSE: Final = "Wisse, Walking Simulation Example, MATLAB files, Delft University of Technology (2003): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
@@ -62,14 +62,17 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that the foot radius is below a limit computed from the value of key `of`, which errors call `name`."""
+    """Validate that the foot radius is below `limit`, a function of the value of key `of`. Messages call it `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
 
 
 def check_inertia(inertia: str, why: str, *places: str) -> Any:
-    """Validate that the key `inertia` is not 0 if the part's mass lies on its upper hinge (all keys `places` are 0)."""
+    """Validate that the key `inertia` is not 0 if the mass of the part is at its upper hinge (all keys `places` are 0).
+
+    why  names, for the error message, the part that would be massless
+    """
 
     def has_inertia(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
@@ -95,17 +98,17 @@ class _Legged(Block):
 
     @property
     def second(self) -> Any:
-        """The walker with two legs like leg 2, or this walker itself if it has no `leg_2`."""
+        """The walker whose legs are both like leg 2, or this walker itself if it has no `leg_2`."""
         return self if getattr(self, "leg_2", None) is None else built_second(self)
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle (rad) between an upright leg and the line from hip to foot centre, or 0 for walkers of parts."""
+        """Angle (rad) from the line of a leg to the line from hip to foot centre, or 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
     def swing_angle(self: Any, stance_rad: float) -> float | None:
-        """Return the angle (rad) of leg 1 behind leg 2 at `stance_rad`, with both feet on the ground.
+        """Return the angle (rad) at which leg 1 touches the ground behind leg 2, which stands at `stance_rad`.
 
         Angles are from the ground's normal. Returns None if leg 1 cannot reach the ground.
         """
@@ -153,13 +156,13 @@ class _Legged(Block):
 
 
 def check_second_leg() -> Any:
-    """Validate the keys of `leg_2`: a walker with two legs like it must be valid."""
+    """Validate the keys of `leg_2`: a walker whose legs are both like it must be valid."""
 
     def makes_a_leg(cls: Any, value: Any, info: ValidationInfo) -> Any:
-        # If another key is invalid, it is missing here, and its error is reported instead.
+        # An invalid key is missing here. Its error is reported anyway, and without it no walker can be built.
         if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
             try:
-                alike_second(cls, info.data, value)
+                double_second_leg(cls, info.data, value)
             except ValidationError as error:
                 first = error.errors()[0]
                 raise meaning_error(f"makes no leg: {'.'.join(map(str, first['loc']))} {first['msg']}") from None
@@ -168,8 +171,8 @@ def check_second_leg() -> Any:
     return field_validator("leg_2")(classmethod(makes_a_leg))
 
 
-def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
-    """Build the walker with two legs like leg 2. `values` are the keys of the walker by name."""
+def double_second_leg(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
+    """Build the walker whose legs are both like `leg`. `values` are the keys of the walker by name."""
     second = {name: value for name, value in values.items() if name != "leg_2"}
     if getattr(leg, "type", None) is not None:
         shared = {
@@ -184,7 +187,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
 
 @lru_cache
 def built_second(walker: Any) -> Any:
-    return alike_second(type(walker), dict(walker), walker.leg_2)
+    return double_second_leg(type(walker), dict(walker), walker.leg_2)
 
 
 class CompassWalker(_Legged):
@@ -197,7 +200,7 @@ class CompassWalker(_Legged):
         "m",
         "distance a from foot to leg mass; from there to the hip it is b = L - a",
         "section 2: 'in the middle of the legs'",
-        bounds="from 0 to below leg_length_m",
+        bounds="at least 0, less than leg_length_m",
         default_in_words="leg_length_m / 2",
         ge=0.0,
     )
@@ -209,7 +212,7 @@ class CompassWalker(_Legged):
         "m",
         "radius of the ball feet of the contact model, 0 for points; their centres are L - r from the hip",
         "section 4: 'beveled with a radius of 1 mm'",
-        bounds="from 0 to below leg_length_m / 2",
+        bounds="at least 0, less than leg_length_m / 2",
         default_in_words="0.001, at most leg_length_m / 10",
         ge=0.0,
     )
@@ -241,7 +244,7 @@ class StraightLegs(_Legged):
     leg_inertia_kg_m2: float = inertia(0.01, "one leg")
     hip_mass_kg: float = mass(0.0, "mass at the hip", WISSE, 0.0)
     foot_radius_m: float = key(
-        0.1, "m", "radius of the sole's arc, 0 for a point", WISSE, bounds="from 0 to below leg_length_m", ge=0.0
+        0.1, "m", "radius of the sole's arc, 0 for a point", WISSE, bounds="at least 0, less than leg_length_m", ge=0.0
     )
     foot_centre_ahead_m: float = offset(0.0, "distance of the arc's centre ahead of the leg's line", WISSE)
     torso: Torso | None = None
@@ -346,7 +349,7 @@ class Kneed(_Legged):
 
 
 class PartBody(Block):
-    """A rigid body, whose own frame is upright when the walker stands upright."""
+    """A rigid body. Its frame is upright when the walker stands upright."""
 
     name: str = name_key("name of the body")
     mass_kg: float = mass(..., "its mass", least=0.0)
@@ -393,8 +396,8 @@ class PartCoupling(Block):
 class AssembledWalker(_Legged):
     """A walker made of parts.
 
-    An extension derives a type of walker from this class. The class has keys of its own, properties that make the parts
-    from them, `leg_length_m`, and the keys `knee`, `torso` and `hip` of `PartsWalker`.
+    An extension derives a type of walker from this class. The derived class has further keys, properties that make the
+    parts from these keys, `leg_length_m`, and the keys `knee`, `torso` and `hip` of `PartsWalker`.
     """
 
     if TYPE_CHECKING:
@@ -460,13 +463,11 @@ class PartsWalker(AssembledWalker):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the first leg's sole below the hip for upright legs, or None if hinges do not
-    connect them.
-    """
+    """Return the depth (m) of the sole of upright leg 1 below the hip, or None if hinges do not connect them."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
-    below, upper = 0.0, 0.0  # m: depth of the body's upper hinge below the hip, and its height above the body's origin
+    below, upper = 0.0, 0.0  # m, of the body's upper hinge: depth below the hip, and height above the body's origin
     for body, lower in pairwise(chain):
         if (body, lower) not in places:
             return None
@@ -502,7 +503,7 @@ def rigid_bodies(walker: Any) -> int:
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Map the index of each coupled angle of the rigid state to its body and the weights of the angles it follows."""
+    """Return the coupled angles of the rigid state by index: name of the body, and weights of the angles it follows."""
     coupled = {}
     if isinstance(walker, AssembledWalker):
         swinging, stance = walker.legs
@@ -523,7 +524,7 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 def is_passive_compass(config: Any) -> bool:
     """Whether the config's walker is a passive compass without torso and with equal legs, as in Appendix A."""
     compass = config.walker.type == "compass" and config.walker.torso is None and config.walker.leg_2 is None
-    return bool(compass and not acting_on(config))
+    return bool(compass and not drives_and_springs_of(config))
 
 
 def leg_inertia(walker: Any) -> float:
@@ -552,7 +553,7 @@ def why_no_push_off(walker: Any) -> str:
 
 
 def why_no_push_on(walker: Any) -> str:
-    """Explain why a leading leg like the walker's first cannot receive a push-off, or return '' if it can."""
+    """Explain why a leading leg like leg 1 cannot receive a push-off, or return '' if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""
@@ -629,7 +630,7 @@ def load_walkers() -> dict[str, type[Block]]:
     Types that cannot be imported are left out, with a warning.
     """
     types = {}
-    for word, code in declared("walkers").items():
+    for word, code in code_by_word("walkers").items():
         try:
             types[word] = load(code)
         except Exception as error:

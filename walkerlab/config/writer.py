@@ -36,7 +36,7 @@ def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> s
 
 def slope_in_degrees(slope_rad: float) -> float | None:
     """Return the slope in degrees if a short number of degrees gives exactly this slope, otherwise None."""
-    # Twelve digits remove the rounding of the conversion, which makes 3.0000000000000004 degrees of 3.
+    # Twelve digits, because the conversion makes 3.0000000000000004 degrees of 3.
     degrees = float(f"{math.degrees(slope_rad):.12g}")
     return degrees if math.radians(degrees) == slope_rad else None
 
@@ -54,7 +54,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
-    """Write a config as YAML with meaning, bounds and unit above each key. It leaves out the keys `left_alone`."""
+    """Write a config, without the keys `left_alone`, as YAML with meaning, bounds and unit above each key."""
     kept = [name for name in type(config).model_fields if name not in left_alone]
     return commented_keys(config, kept) + "".join(f"# {name}: {ELSEWHERE.format(name)}\n" for name in left_alone)
 

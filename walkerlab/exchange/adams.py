@@ -1,8 +1,8 @@
-"""ADAMS export: the dataset (.adm) of a walker, the commands (.acf) that run it, and the commands (.cmd) that build the
-same objects in ADAMS View.
+"""ADAMS export of a walker: a dataset (.adm) with the commands (.acf) that run it, or the commands (.cmd) that build
+the same objects in ADAMS View.
 
-View's objects are in the order in which it writes them: parts with their markers, joints, contacts, forces, and finally
-all functions, because a function may refer to any object.
+Commands have the order in which View writes them: parts with their markers, joints, contacts, forces, and finally all
+functions, because a function may refer to any object.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,7 +19,7 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 
 def statements(model: AdamsModel) -> Iterator[str]:
-    """Yield the lines of all statements. Objects of each kind are numbered from 1, and part 1 is the ground."""
+    """Yield the lines of all statements. Objects of each kind are numbered from 1. Part 1 is the ground."""
     ids = model.numbers
 
     def expression(text: str) -> str:
@@ -58,7 +58,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, function in model.variables.items():
         yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
-        # Of several functions in a statement, all but the last end in a backslash.
+        # If a statement has several functions, all but the last must end in a backslash.
         yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
@@ -108,7 +108,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
 
 
 def named_statement(name: str, head: str, *arguments: str) -> Iterator[str]:
-    """Yield a statement after the comment that names its object in Adams View."""
+    """Yield a comment that names an object for Adams View, then the statement of the object."""
     yield f"!                adams_view_name='{name}'"
     yield from statement(head, *arguments)
 

@@ -1,7 +1,7 @@
 """Walker as ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
 
-The walk takes place in the x-y plane, x along the slope and y normal to it; gravity is tilted.
-Expressions name markers and variables in braces, as in DX({leg_1.foot}); each file format inserts its own names.
+The walk takes place in the x-y plane, x along the slope and y normal to it. Gravity is tilted.
+Expressions name markers and variables in braces, as in DX({leg_1.foot}). Each file format replaces them by its names.
 """
 
 import math
@@ -27,13 +27,13 @@ GROUND = "ground"
 ORIGIN = "ground.origin"
 BELOW = "ground.below"
 FREE_LENGTH_MM = 100.0
-"""Free length in IMPACT for a point foot. Heights of the foot are measured from a marker at this depth in the ground.
+"""Free length in IMPACT for a point foot, and depth in the ground of the marker from which foot heights are measured.
 """
 PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
 FRICTION_NAMES = ("mu_static", "mu_dynamic", "stiction_transition_velocity", "friction_transition_velocity")
-"""ADAMS's names for the fields of `Coulomb`, in the same order."""
+"""Names in ADAMS of the fields of `Coulomb`, in the same order."""
 REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
@@ -42,7 +42,7 @@ TIME_FACTOR = 1.05
 """Maximum simulated time between events, as a multiple of the duration of walkerlab's walk."""
 ERROR_RAD = 1e-6
 ERROR_MM = 1e-6
-"""Tolerances of sensors. ADAMS's default is 1e-3 in the unit of the expression."""
+"""Tolerances of sensors. The default of ADAMS is 1e-3 in the unit of the expression."""
 Place = tuple[float, float, float]
 
 
@@ -57,7 +57,7 @@ class Marker:
 
 @dataclass(frozen=True)
 class Part:
-    """Rigid body: position (mm), angle (rad), velocity (mm/s), spin (rad/s), mass (kg) and inertia (kg mm^2)."""
+    """Rigid body. Units are mm, rad, mm/s, rad/s, kg and kg mm^2."""
 
     place: tuple[float, float]
     angle: float
@@ -92,7 +92,7 @@ class AdamsContact:
 
     foot: str
     pads: tuple[str, ...]
-    normal: dict[str, float]  # parameters of the normal force by ADAMS's names, in N, mm, s
+    normal: dict[str, float]  # parameters of the normal force by their names in ADAMS, in N, mm, s
     friction: dict[str, float]  # parameters of the friction, in mm/s; empty if there is no friction
 
 
@@ -127,7 +127,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Event:
-    """A sensor that a run waits for, and the objects that are activated and deactivated when it triggers."""
+    """Sensor that a run waits for, and the objects to activate and deactivate when it triggers."""
 
     sensor: str
     activated: tuple[str, ...] = ()
@@ -158,7 +158,7 @@ class AdamsModel:
 
     @cached_property
     def numbers(self) -> dict[str, int]:
-        """Number of each object among those of its kind, counted from 1."""
+        """Number by which ADAMS identifies each object. Objects of each kind are counted from 1."""
         primitives = [name for name, joint in self.joints.items() if joint.kind == "INLINE"]
         # ADAMS numbers primitives separately from joints.
         joints = [name for name in self.joints if name not in primitives]
@@ -180,7 +180,7 @@ class AdamsModel:
         yield from (self.switch("deactivate", name) for name in self.inactive)
         for event in self.events:
             yield self.switch("activate", event.sensor)
-            # a slower walk still reaches its last event
+            # More time than the walk took, so that a slower walk still reaches its last event.
             yield run.format(finite(TIME_FACTOR * end_s))
             yield from (self.switch("deactivate", name) for name in (event.sensor, *event.deactivated))
             yield from (self.switch("activate", name) for name in event.activated)
@@ -188,13 +188,13 @@ class AdamsModel:
             yield run.format(finite(end_s))
 
     def switch(self, word: str, name: str) -> str:
-        """Return the command that activates or deactivates an object."""
+        """Return the command that activates or deactivates (`word`) the object `name`."""
         kinds = (("motion", self.motions), ("sensor", self.sensors), ("sforce", self.torques), ("jprim", self.joints))
         kind = next(kind for kind, objects in kinds if name in objects)
         return f"{word}/{kind}, id = {self.numbers[name]}"
 
     def shape_name(self, shape: str) -> str:
-        """Prefix a shape's name with the name of its part."""
+        """Return the name of a shape, preceded by that of the part to which it belongs."""
         return f"{self.markers[self.shapes[shape].marker].part}.{shape}"
 
 
@@ -314,17 +314,17 @@ class FootTerms:
         return MM * float(self.export.scene.ours.whole.radius[self.foot])
 
     def place(self, base: str = ORIGIN) -> str:
-        """Arguments for functions that measure the foot's position relative to the marker `base`."""
+        """Return the arguments of ADAMS functions that measure the foot's position relative to the marker `base`."""
         return f"{{{self.marker}}},{{{base}}},{{{ORIGIN}}}"
 
     @property
     def motion(self) -> str:
-        """Arguments for functions that measure the foot's velocity relative to the ground."""
+        """Arguments of ADAMS functions that measure the velocity of the foot relative to the ground."""
         return f"{self.place()},{{{ORIGIN}}}"
 
     @property
     def slip(self) -> str:
-        """Slip velocity (mm/s), along the slope, of the material at the foot's lowest point."""
+        """Slip velocity (mm/s): velocity along the slope of the material at the lowest point of the foot."""
         rolling = f"+{finite(self.radius)}*WZ({{{self.marker}}},{{{ORIGIN}}})" if self.radius else ""
         return f"VX({self.motion}){rolling}"
 
@@ -333,7 +333,7 @@ class FootTerms:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
     def restrict_to_pads(self, expression: str, elsewhere: str = "0") -> str:
-        """Restrict an expression to the pads of the foot's lane. Between the pads its value is `elsewhere`."""
+        """Return an expression that equals `expression` on the pads of the foot's lane and `elsewhere` between them."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
@@ -370,7 +370,7 @@ def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
         raise ConfigError(
             f"The normal-force law {type(normal).__name__} cannot be exported.", "Set contact.normal_force=impact."
         )
-    # Stiffness is in N/mm^e, so its factor depends on the exponent. ADAMS View scales it like force per length,
+    # Stiffness is in N/mm^e, so the factor depends on the exponent. ADAMS View scales it like force per length,
     # whatever the exponent is.
     in_mm = Impact(
         normal.stiffness / MM**normal.exponent,
@@ -409,7 +409,7 @@ def add_contacts(model: AdamsModel, export: Exported) -> None:
 
 
 def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
-    """Add walkerlab's law as functions of time and state: slip, normal force and friction of each foot."""
+    """Add slip, normal force and friction of each foot by the laws of walkerlab, as functions of time and state."""
     if export.heights is not None:
         raise ConfigError(
             "Uneven ground cannot be written as functions.", "Export with --law contact, or leave out the block ground."
@@ -426,11 +426,11 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
 
 
 def friction_function(leg: str, law: Coulomb) -> str:
-    """Return the expression for the friction force on a leg's foot, a function of the foot's slip and normal force."""
+    """Return the expression for the friction force on the foot of a leg, by its slip and normal force."""
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
-    # Beyond v the rise stays at mu or -mu, and the second STEP adds the fall to the dynamic coefficient.
+    # The first STEP stays at mu or -mu beyond v. The second one adds the fall to the dynamic coefficient.
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 
@@ -492,7 +492,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.damping_N_m_s_per_rad:
         terms.append(f"-{finite(MM * hip.damping_N_m_s_per_rad)}*WZ({{{i}}},{{{j}}},{{{j}}})")
     if hip.torque_N_m:
-        # Each factor changes its sign at its touchdown.
+        # Each factor changes its sign at one touchdown, so the product does at all of them.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
         # ADAMS rejects most line breaks within an expression, so a long one is divided into variables.
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
@@ -508,7 +508,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     """Add stops and locks of the knees, and the events of walkerlab's walk that switch them.
 
     An ADAMS function has no memory, and a command file no branches. So the run waits for one sensor after the other, in
-    the order of walkerlab's walk; other sensors halt it if the walker falls or comes down on a bent knee.
+    the order of walkerlab's walk. Other sensors halt it if the walker falls or comes down on a bent knee.
     """
     law = knee_rules(export.config.walker).stop
     assert isinstance(law, Impact), "the export has a compliant stop"
@@ -519,12 +519,12 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         foot = FootTerms(export, number)
         other = LEGS[1 - number]
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
-        # Over a gap the sensor must not reach zero.
+        # Between the pads, where there is no ground, the sensor must not reach zero.
         down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
         down_ahead = Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM)
         sinking = f"VY({foot.motion})"
         if f"{other}_pulses" in model.variables:
-            # the trailing knee stays locked during the push-off
+            # A value of -1 keeps the trailing knee locked during the push-off.
             sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
         model.sensors |= {f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM), f"{leg}_touches": down_ahead}
         if number >= len(export.knee_links):

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.marker_lines import (
-    HUGE,
+    MAX_VALUE,
     Line,
     body_doubts,
     body_gaps,
     find_plane,
     frozen_rows,
     refuse_running,
+    replace_unseen,
     spell_rows,
     swap_lines_back,
-    unseen_as_gaps,
 )
 from walkerlab.exchange.recording import SEGMENTS, TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
@@ -46,9 +46,9 @@ UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Position (m) along the walk of the upper marker of the first line, if angles are those of lines."""
+"""Quantity: position (m) of the upper marker of the first line along the walk, if angles are those of lines."""
 SAMPLE: Final = "sample"
-"""Number of each sample in the file, from 1."""
+"""Quantity: number of each sample in the file, counted from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
 CHANGED: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
 """Pattern for a column with another sign, and a constant with its unit."""
@@ -58,7 +58,7 @@ PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
 FRAME_TIME: Final = "frame / fps"
 SAME_RATE: Final = 0.01  # frame rates that differ by less than this (relative) count as equal
 LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
-UNLIKELY: Final = 0.5  # likelihood below which the position of a marker is doubtful
+DOUBTFUL_LIKELIHOOD: Final = 0.5  # likelihood below which the position of a marker is doubtful
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)  # reason, by quantity, why its column is not used
+    left_out: dict[str, str] = field(default_factory=dict)  # by quantity: why its column is not used
     walks: str = ""  # stated direction of the walk; '' to find it
     unit_is_stated: bool = True  # whether the file or the user states the unit of the leg angles explicitly
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
@@ -86,7 +86,7 @@ class RecordedWalk:
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """Source of a quantity: a column, or a line between markers. Its values are multiplied by a sign, then shifted."""
+    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then shifted."""
 
     column: str
     sign: float = 1.0
@@ -104,7 +104,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
     recording, notes = set_frame_times(recording, asked)
-    # A stated unit of time is that of the file's times, which the frame rate has replaced.
+    # The frame rate has replaced the times of the file, so a unit stated for them does not apply.
     if FRAME_TIME in recording.columns:
         units = {name: unit for name, unit in units.items() if name != TIME}
     named = find_named(recording, asked)
@@ -118,15 +118,15 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
     recording, more_notes = remove_unlikely_positions(recording, [sources[name] for name in ends], asked.min_likelihood)
     for pairs in ends.values():
-        columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
+        columns_with_gaps, unseen = replace_unseen(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
-    # Lines are left out here, because their markers are examined one by one (see `body_gaps`).
+    # Frozen markers of lines are found later, marker by marker, see `body_gaps`.
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
     # A fault in a column that every walk needs, or that the user names, is an error. Other columns are only left out.
     needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
     time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
     rows = select_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
-    rows, cut, gaps = remove_gaps(recording, needed, rows)
+    rows, cut, gaps = rows_without_gaps(recording, needed, rows)
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
     values = {}
@@ -148,7 +148,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     used = {name: sources[name] for name in (TIME, *values, *lines)}
-    # Messages name samples by their numbers in the file, however many are left out from here on.
+    # Samples may be left out from here on, but messages name them by their numbers in the file.
     values[SAMPLE] = np.asarray(1.0 + np.flatnonzero(rows))
     tilt, tilt_notes = camera_tilt(recording, asked, slope_rad)
     walk = RecordedWalk(
@@ -187,7 +187,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
     elif intervals.size and (typical := float(np.median(intervals))) > 0.0:
-        # Where the file leaves out frames, its times are farther apart, so rounding still counts them.
+        # If the file leaves out frames, times are farther apart. Rounding counts the missing frames, too.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
         if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
@@ -216,10 +216,10 @@ def remove_unlikely_positions(
         if re.fullmatch(rf"{re.escape(marker)}{LIKELIHOOD}", column)
     }
     if least is None:
-        low = {marker: each for marker, each in likelihoods.items() if np.any(each < UNLIKELY)}
-        spelled = ", ".join(f"{marker} at {spell_rows(each < UNLIKELY)}" for marker, each in low.items())
+        low = {marker: each for marker, each in likelihoods.items() if np.any(each < DOUBTFUL_LIKELIHOOD)}
+        spelled = ", ".join(f"{marker} at {spell_rows(each < DOUBTFUL_LIKELIHOOD)}" for marker, each in low.items())
         return recording, [
-            f"Likelihoods are below {UNLIKELY:g}: {spelled}; --min-likelihood makes such places gaps."
+            f"Likelihoods are below {DOUBTFUL_LIKELIHOOD:g}: {spelled}; --min-likelihood makes such places gaps."
         ] if low else []
     if not likelihoods:
         raise ConfigError(
@@ -255,7 +255,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
     """Return the forward lean (rad) of the direction from which angles are measured, and notes about it."""
     tilt = asked.camera_tilt_deg
     if tilt is None and recording.levelled_by:
-        # In tables of angles the floor's angle is added to the values instead (see `floor_in_column`).
+        # In tables of angles, the angle of the floor is added to the values instead, see `floor_in_column`.
         return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
             f"{recording.levelled_by} levels the floor, so angles are taken from the floor's normal: state "
             "--camera-tilt 0 if its floor_angle was 0."
@@ -266,7 +266,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
 
 
 def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
-    """Return the angle (rad) that Sports2D subtracted from the angles of segments to level the floor in its picture.
+    """Return the angle (rad) that Sports2D subtracted from the angles of segments to level the floor in the picture.
 
     Sports2D uses the same sign for walks in both directions, although it mirrors the picture of a walk to the left.
     """
@@ -286,7 +286,7 @@ def add_lines(
     named = {walk.sources[name]: line for name, line in lines.items()}
     off, jumps = body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
     lines = {name: (top[~off], bottom[~off]) for name, (top, bottom) in lines.items()}
-    walk = only_rows(walk, ~off)
+    walk = select_rows(walk, ~off)
     plane = find_plane(lines, walk.walks)
     refuse_running(lines, plane, source)
     angles = {name: plane.angle(line) + constants.get(name, 0.0) for name, line in lines.items()}
@@ -302,7 +302,7 @@ def add_lines(
     return replace(walk, quantities=quantities, lines=tuple(lines), doubts=doubts, gaps=gaps)
 
 
-def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
+def select_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
     """Return the samples of a walk where `rows` (samples,) is true."""
     kept = {name: values[rows] for name, values in walk.quantities.items()}
     return replace(walk, time_s=walk.time_s[rows], quantities=kept)
@@ -316,13 +316,13 @@ def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
 
 
 def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
-    """Mark the samples in the requested part of the recording.
+    """Find the samples in the requested part of the recording.
 
     Raises ConfigError if there are none.
     """
     begin = -math.inf if asked.from_s is None else asked.from_s
     end = math.inf if asked.to_s is None else asked.to_s
-    # Samples without a time are neither before nor after the part, so they remain and are reported as gaps.
+    # Written as a negation, so that samples without a time remain and are reported as gaps.
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
@@ -333,17 +333,17 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     return np.asarray(rows)
 
 
-def remove_gaps(
+def rows_without_gaps(
     recording: Recording, sources: Iterable[str], rows: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], str, str]:
-    """Mark the rows without gaps in any source. Also describes the samples cut off at the ends, and the gaps within.
+    """Find the rows in which no source has a gap. Also describe the samples cut off at the ends, and the gaps between.
 
     Raises ConfigError for a column that does not contain numbers, and if every sample has a gap.
     """
     used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
         refuse_problem(recording, column)
-    finite = {column: np.abs(recording.columns[column]) < HUGE for column in used}
+    finite = {column: np.abs(recording.columns[column]) < MAX_VALUE for column in used}
     whole = rows & np.all(list(finite.values()), axis=0)
     if not whole.any():
         raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")
@@ -412,7 +412,7 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
     columns = {column: normalise_name(column) for column in recording.columns}
     by_ending: dict[str, list[str]] = {}
     for column, name in columns.items():
-        # ADAMS puts names of objects before that of a quantity, separated by dots, and OpenSim by slashes.
+        # Names of objects precede that of a quantity. ADAMS separates them by dots, OpenSim by slashes.
         for start in (0, *(match.end() for match in re.finditer(r"[./]", name))):
             by_ending.setdefault(name[start:], []).append(column)
     sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
@@ -482,7 +482,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
 
 
 def named_column(recording: Recording, name: str) -> str:
-    """Return the column that a user names. The unit in brackets, which the header may have, can be left out."""
+    """Return the column that a user names, with or without the unit in brackets that its header may have."""
     name = name.strip()
     return name if name in recording.columns else UNIT_IN_NAME.sub("", name)
 
@@ -527,14 +527,14 @@ def axes_of(recording: Recording, marker: str) -> dict[str, str]:
 
 
 def unknown_column_error(recording: Recording, column: str) -> ConfigError:
-    """Build the error for a column that the file lacks. It suggests the one with the most similar name."""
+    """Build the error for a column that the file lacks, with the most similar name as a suggestion."""
     near = get_close_matches(column, recording.columns, 1, 0.3)
     advice = f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
     return ConfigError(f"{recording.path} has no column {column!r}.", advice)
 
 
 def missing_error(recording: Recording, name: str) -> ConfigError:
-    """Build the error for a quantity without a column. It suggests the column with the most similar name."""
+    """Build the error for a quantity without a column, with the most similar name as a suggestion."""
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
         return ConfigError(
@@ -555,7 +555,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
 
 
 def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
-    """Raise ConfigError if a unit is stated for something unknown, or is of another kind."""
+    """Raise ConfigError if a unit is stated for something unknown or for a quantity of another kind."""
     for name, unit in units.items():
         if name not in (*UNIT_VALUES, *quantities, *recording.columns):
             near = get_close_matches(name, (*UNIT_VALUES, *quantities, *recording.columns), 1)

@@ -16,7 +16,7 @@ from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_poin
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-# ratio of tangential to normal force of a standing foot; about the mean over a walk
+# Ratio of tangential to normal force of a standing foot, about the mean over a walk.
 CREEP_LOAD = 0.1
 
 
@@ -53,15 +53,15 @@ class EngineScene:
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
     def lock_knees(self, doing: NDArray[np.int8]) -> "EngineScene":
-        """Return the scene with the knees in state LOCKED locked."""
+        """Return the scene without hinges at the knees that `doing` marks as LOCKED."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Vectors (bodies, 2) in m in the body frames.
+        """Vectors (bodies, 2) in m, in the frames of the bodies.
 
-        Rotated by the bodies' angles, they lead from base to mass centre.
+        Rotated by the angles of the bodies and summed, they lead from the base to the centre of mass.
         """
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
@@ -74,7 +74,7 @@ class EngineScene:
         shift, drift = self._centre(angles, rates)
         position = np.array(y[:2]) - shift
         velocity = np.array(y[2 + n : 4 + n]) - drift
-        # Bodies of a locked leg have equal rows, so there may be more equations than angles. They agree.
+        # Bodies of a locked leg have equal rows. So there may be more equations than angles, but they are consistent.
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
@@ -102,8 +102,7 @@ class EngineScene:
 def engine_scene(
     config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
 ) -> EngineScene:
-    """Build the scene of a config, with no foot pinned and no knee locked. `pad_pitch: own` becomes the rigid step
-    length.
+    """Build the scene of a config without pinned foot or locked knees. `pad_pitch: own` becomes the rigid step length.
 
     asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
     """
@@ -148,7 +147,7 @@ def creep_velocity(friction: FrictionLaw, load: float) -> float:
 
 
 def contact_target(scene: EngineScene) -> EngineContact | None:
-    """Linearise the walker's contact under its weight on one foot, or None on frictionless ground."""
+    """Linearise the contact of a walker that stands on one foot, or return None for frictionless ground."""
     walker = scene.ours
     friction = walker.friction
     if friction.largest == 0.0:

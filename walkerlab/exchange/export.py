@@ -47,7 +47,7 @@ def export_model(
     """Export a walker to another program, with the start that `contact-sim` derives from a rigid start.
 
     kind    adm: dataset and commands of ADAMS/Solver; cmd: commands of Adams View; mjcf: MuJoCo model
-    law     contact law in ADAMS: its own contact between shapes, or walkerlab's law as functions
+    law     contact law in ADAMS: the built-in contact between shapes, or walkerlab's law as functions
     commit  commit of walkerlab, for the header of the file
     stem    stem of the file names; by default the config's name
     slope   in MuJoCo: whether gravity is tilted, or the ground and the walker on it
@@ -96,14 +96,15 @@ def parse_law(text: str) -> Law:
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way to express a slope that `text` names, as `choose` does."""
+    """Return the way of expressing a slope that `text` names, as `choose` does."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
 def add_stops(config: Config) -> Config:
     """Return a config in which a stop brings each knee to rest before it locks.
 
-    ADAMS changes velocities by rules of its own when a joint is activated. They change nothing if the knee is at rest.
+    When a joint is activated, ADAMS changes velocities by rules that are not ours. If the knee is at rest, they change
+    nothing.
     """
     walker = config.walker
     if not isinstance(walker, Kneed) or walker.knee.lock == "compliant":
@@ -124,7 +125,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
         if parts := mjcf.parts_of_script(export):
             yield f"{', '.join(parts)}, which the script {script} applies instead"
     else:
-        # `add_stops` has replaced an ideal lock.
+        # The configs differ only if `add_stops` has replaced an ideal lock.
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
         when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"

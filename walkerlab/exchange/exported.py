@@ -43,7 +43,7 @@ class Pad:
 
 
 class GaitStart(NamedTuple):
-    """Start of a walk in the rigid model, with the steps of its gait.
+    """State at the start of a walk, and the step lengths of the gait.
 
     step_length_m  mean step length (m), the default distance between pads
     state          the gait, or another state with both feet on the slope
@@ -72,11 +72,11 @@ class Exported:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Unique link names that other programs accept. The first link is the first stance leg, hinged at the hip."""
+        """Unique names of the links that other programs accept. Link 0 is the first stance leg, hinged at the hip."""
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
-            # There are more choices than other names, so one of them is free.
+            # There are more choices than links, so at least one is free.
             choices = (name, *(f"{name}_{number}" for number in range(2, len(self.model.links) + 3)))
             names.append(next(choice for choice in choices if choice not in (*names, *RESERVED)))
         return tuple(names)
@@ -103,13 +103,13 @@ class Exported:
 
     @property
     def knee_links(self) -> tuple[int, ...]:
-        """Index of the shank of each leg that has one: both, the first leg's, or ()."""
+        """Indices of the shank links, by leg: two, one (of the first leg) or none."""
         # The first two coordinates are the position of the base.
         return tuple(index - 2 for index in self.scene.knee_indices)
 
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
-        """Weights, by link, of the hinge angles of bodies that follow other bodies. Each weighted sum is zero."""
+        """Weights of hinge angles, by link, for each body that follows others. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
             # Only if the weights add up to 1 does the base's angle drop out, so that relative angles suffice.
@@ -144,7 +144,7 @@ class Exported:
         return terrain.lanes[foot] - round(terrain.lanes[foot] / terrain.pitch) * terrain.pitch
 
     def lane_across_m(self, foot: int) -> float:
-        """Signed distance (m) of a foot's lane from the plane of the walk. No ball reaches the other foot's lane."""
+        """Signed distance (m) of a foot's lane from the plane of the walk. No ball reaches the other lane."""
         distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
         return -distance if foot == STANCE_FOOT else distance
 
@@ -155,7 +155,7 @@ class Exported:
 
     @property
     def touches_s(self) -> list[float]:
-        """Times (s) of the touchdowns that end the steps of walkerlab's walk."""
+        """Times (s) of the touchdowns in walkerlab's walk, one at the end of each step."""
         return [float(time) for time in self.walk.touch_time_s]
 
     @property
@@ -167,7 +167,10 @@ class Exported:
         return identifier(self.config.name)
 
     def describe(self, left_out: Iterable[str], commit: str | None, tilted: str) -> Iterator[str]:
-        """Yield the header of an exported file: origin, what is tilted, walkerlab's own walk, and omissions."""
+        """Yield the header of an exported file: origin, slope, walkerlab's walk for comparison, and omissions.
+
+        tilted  what is tilted to express the slope
+        """
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
         yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted {tilted}."
         yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."

@@ -1,4 +1,4 @@
-"""Repair recorded leg angles before heel strikes are sought: full turns, swapped legs, outliers, signs, return walks.
+"""Repairs of recorded leg angles before the search for heel strikes: turns, swapped legs, outliers, signs, ways back.
 
 Each repair is listed in the doubts of the walk, with samples and times.
 """
@@ -12,15 +12,15 @@ from typing import Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, only_rows
-from walkerlab.exchange.marker_lines import NAMED, spell_samples, swap_doubt, swapped_rows
+from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, select_rows
+from walkerlab.exchange.marker_lines import MAX_NAMED, spell_samples, swap_doubt, swapped_rows
 from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
-from walkerlab.exchange.touches import ERRORS
+from walkerlab.exchange.touches import SIGNIFICANT_ERRORS
 
 UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg's angle from the vertical
-FEWEST_PASSING: Final = 3  # a passing of the legs takes at least this many sample intervals
-TINY: Final = 1e-30  # rad^2, added to a variance that may be zero
+MIN_PASSING_SAMPLES: Final = 3  # a passing of the legs takes at least this many sample intervals
+MIN_VARIANCE: Final = 1e-30  # rad^2, added to a variance that may be zero
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def add_doubt(walk: RecordedWalk, doubt: str) -> RecordedWalk:
 
 
 def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Undo jumps by full turns, and subtract half a turn from angles that are measured from the upward vertical.
+    """Undo jumps by full turns. Subtract half a turn from angles that are measured from the upward vertical.
 
     Raises ConfigError for angles in another unit, and for a leg that is not near the vertical.
     """
@@ -86,7 +86,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
 
 
 def swap_back(walk: RecordedWalk) -> RecordedWalk:
-    """Swap the legs back where their angles change places from one sample to the next."""
+    """Swap the legs back where their angles are exchanged from one sample to the next."""
     angle = read_leg_angles(walk)
     swapped = swapped_rows(walk.time_s, angle[:, :1] - angle[:, 1:])
     if not swapped.any():
@@ -118,7 +118,7 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
         spelled = ", ".join(
             f"angle {jump.leg + 1} jumps by {jump.offset_rad:.3g} rad from sample {numbers[jump.first - 1]:.0f} to "
             f"{numbers[jump.first]:.0f} (time {walk.time_s[jump.first]:.6g} s)"
-            for jump in jumps[:NAMED]
+            for jump in jumps[:MAX_NAMED]
         )
         kept = f"from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s"
         doubt = (
@@ -127,14 +127,14 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
         )
         walk = add_doubt(walk, doubt)
         rows[:begin] = rows[end:] = False
-    return only_rows(walk, rows)
+    return select_rows(walk, rows)
 
 
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     """Make angles positive with the foot ahead, and keep the longest stretch in one direction.
 
-    The legs swing in opposite directions. As they pass each other, the swing foot moves forwards relative to the hip,
-    and faster than the foot on the ground moves backwards.
+    As the legs pass each other, the swing foot moves forwards relative to the hip, faster than the foot on the ground
+    moves backwards.
     """
     angle = read_leg_angles(walk)
     swing = angle - np.mean(angle, axis=0)
@@ -158,7 +158,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
     kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
-    return only_rows(
+    return select_rows(
         add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
     )
 
@@ -171,26 +171,24 @@ def find_ways(time: Array, angle: Array) -> list[Way]:
     trends = [
         (last, first, trend(time[last : first + 1], total[last : first + 1]))
         for (_, last), (first, _) in pairwise(runs)
-        if spread[last] * spread[first] < 0.0 and first - last >= FEWEST_PASSING
+        if spread[last] * spread[first] < 0.0 and first - last >= MIN_PASSING_SAMPLES
     ]
-    passings = [(last, first, errors > 0.0) for last, first, errors in trends if abs(errors) > ERRORS]
+    passings = [(last, first, errors > 0.0) for last, first, errors in trends if abs(errors) > SIGNIFICANT_ERRORS]
     alike = [list(group) for _, group in groupby(passings, itemgetter(2))]
     lasting = [passing for group in alike if len(group) > 1 for passing in group] or passings
     return [Way(way, [(a, b) for a, b, _ in group]) for way, group in groupby(lasting, itemgetter(2))]
 
 
 def trend(time: Array, values: Array) -> float:
-    """Fit a line through values, and return its slope divided by the standard error of the slope."""
+    """Fit a line to values, and return its slope divided by the standard error of the slope."""
     share = (time - np.mean(time)) / np.ptp(time)
     slope = float(share @ values) / float(share @ share)
     residuals = values - np.mean(values) - slope * share
-    return slope / math.sqrt(float(residuals @ residuals) / (time.size - 2) / float(share @ share) + TINY)
+    return slope / math.sqrt(float(residuals @ residuals) / (time.size - 2) / float(share @ share) + MIN_VARIANCE)
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample, between two stretches, at which the hip turns round. Without markers, return the middle
-    one.
-    """
+    """Return the sample between two stretches at which the hip turns round, or the middle sample without markers."""
     begin = before.passings[-1][1]
     end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)

@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk runs along the horizontal line on which the legs move most relative to each other. Which way it runs shows only
-when the legs pass each other, see `leg_angles`.
+The walk runs along the horizontal line on which the legs move most relative to each other. In which of the two
+directions, shows only when the legs pass each other, see `leg_angles`.
 """
 
 from __future__ import annotations
@@ -19,24 +19,26 @@ from walkerlab.exchange.rate_jumps import Array, apart_runs
 Line = tuple[Array, Array]
 """Positions (samples, axes) of the upper and the lower marker (m)."""
 
-NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
-JUMP: Final = 8.0  # smallest jump of a line's length between samples, in standard deviations of all changes
-SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
+MAX_NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
+MIN_JUMP: Final = 8.0  # smallest change of length that counts as a jump, in standard deviations of all changes
+MIN_RELATIVE_JUMP: Final = 0.01  # and as a fraction of the length
 NEIGHBOURS: Final = 5  # a change is compared with the median of this many neighbouring changes
-HUGE: Final = 1e50  # larger values count as gaps, because their squares overflow
-FEWEST_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
-LONGEST_LEAP: Final = 1.5  # a leap may span at most this many times the number of frozen samples before it
+MAX_VALUE: Final = 1e50  # larger values count as gaps, because their squares overflow
+MIN_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
+MAX_LEAP: Final = 1.5  # a leap may span at most this many times the number of frozen samples before it
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
-SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
-ONE_HIP: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
-NORMAL: Final = 1.4826  # ratio of standard deviation to median absolute deviation in a normal distribution
+MAX_SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
+MAX_HIP_MOTION: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
+MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
-RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
+RUNNING_CORRELATION: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
-FAST_PERCENT: Final = 80  # percentile of the motions between samples above which they count as fast
-EXCHANGE: Final = 0.2  # an exchange of legs lowers the squared unevenness by at least this many squared fast motions
-SCATTER: Final = 40.0  # and by at least this multiple of the median squared unevenness
+FAST_PERCENT: Final = 80  # motions between samples above this percentile count as fast
+# An exchange of legs lowers the squared unevenness by at least this many squared fast motions.
+MIN_EXCHANGE_GAIN: Final = 0.2
+# It also lowers it by at least this multiple of the median squared unevenness.
+MIN_SCATTER_RATIO: Final = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,7 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Describe the samples where `rows` (samples,) is true by their numbers in the file and their times."""
+    """Describe the samples that `rows` (samples,) marks, by their numbers in the file and their times."""
 
     def spell_times(first: int, last: int) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
@@ -62,12 +64,12 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def spell_rows(rows: NDArray[np.bool_]) -> str:
-    """Describe the samples where `rows` (samples,) is true by their numbers, which count from 1."""
+    """Describe the samples that `rows` (samples,) marks, by their numbers counted from 1."""
     return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
 def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
-    """Describe the samples where `rows` (samples,) is true, by their `numbers`.
+    """Describe the samples that `rows` (samples,) marks, by their `numbers` (samples,).
 
     If given, `addition(first, last)` returns a text to append to each stretch.
     """
@@ -75,13 +77,13 @@ def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[i
     places = [
         (f"sample {numbers[first]:.0f}" if first == last else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}")
         + (addition(first, last) if addition else "")
-        for first, last in runs[:NAMED]
+        for first, last in runs[:MAX_NAMED]
     ]
-    return ", ".join(places) + (f" and {len(runs) - NAMED} more places" if len(runs) > NAMED else "")
+    return ", ".join(places) + (f" and {len(runs) - MAX_NAMED} more places" if len(runs) > MAX_NAMED else "")
 
 
 def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) at which two points are exchanged, at most half of them.
+    """Find the samples (samples,) at which two points are exchanged, at most half of all.
 
     Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each one must make the
     motion more even by more than fast motions or scatter can explain.
@@ -101,9 +103,9 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     after = apart[2:]
     costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
     fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
-    least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
-    # Consecutive exchanges between n samples can change the unevenness at these n samples only, and cost n - 1 times
-    # `least`. So without any stretch of samples that could gain as much, there are none.
+    least = max(MIN_EXCHANGE_GAIN * fast, MIN_SCATTER_RATIO * float(np.median(costs[0][0])))
+    # Exchanges in n consecutive samples change the unevenness of these samples only, and cost n - 1 times `least`. If
+    # no stretch of samples could gain that much, there are no exchanges, and the slow search below is not needed.
     gains = np.pad(costs[0][0] - np.min(costs, axis=(0, 1)), 1)
     sums = np.append(0.0, np.cumsum(gains - least))
     if np.all(sums[2:] - np.minimum.accumulate(sums)[:-2] <= -least):
@@ -123,14 +125,14 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     mended = np.where(swapped[:, None], -apart, apart)
     rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
     for first, last in apart_runs(swapped, swapped):
-        # an outlier of one of the two points is not an exchange
+        # If one of the two points has an outlier here, this is not an exchange.
         if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
             swapped[first : last + 1] = False
     return np.asarray(swapped)
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each pair that was mended."""
+    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each exchanged pair."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -176,9 +178,11 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     for _ in range(PLANE_FITS):
         # The small term puts horizontal directions first, even if the legs do not move.
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
-        # a marker that jumps sideways would turn the plane
+        # Left in, a marker that jumps sideways would turn the plane.
         off = np.abs(motion @ sideways - np.median(motion @ sideways))
-        motion = motion[off <= JUMP * NORMAL * np.median(off) + SMALLEST_JUMP * np.ptp(motion @ ahead)]
+        motion = motion[
+            off <= MIN_JUMP * MAD_TO_DEVIATION * np.median(off) + MIN_RELATIVE_JUMP * np.ptp(motion @ ahead)
+        ]
     drift = float((legs[0][0][-1] - legs[0][0][0]) @ ahead)
     return WalkPlane(up, ahead if drift > 0.0 else -ahead)
 
@@ -197,10 +201,10 @@ def stated_direction(walks: str, up: Array) -> Array:
     return np.asarray(direction[: up.size])
 
 
-def unseen_as_gaps(
+def replace_unseen(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Replace markers that were not seen by gaps. Also return, by column, which values were replaced.
+    """Replace the coordinates of markers that were not seen by gaps. Also return the reasons, by column.
 
     Programs write zeros, or another value, for all coordinates of a marker that they did not see. A foot may also stand
     at the origin, so equal coordinates are a gap only if they give the line an unusual length.
@@ -208,7 +212,7 @@ def unseen_as_gaps(
     pairs  columns of both ends for each coordinate
     """
     ends = list(zip(*pairs, strict=True))
-    places = [np.clip([columns[name] for name in names], -HUGE, HUGE) for names in ends]
+    places = [np.clip([columns[name] for name in names], -MAX_VALUE, MAX_VALUE) for names in ends]
     length = np.linalg.norm(places[1] - places[0], axis=0)
     seen = length[np.isfinite(length)]
     gaps = dict(columns)
@@ -216,7 +220,7 @@ def unseen_as_gaps(
     if not seen.size:
         return gaps, unseen
     usual = float(np.median(seen))
-    allowed = max(JUMP * NORMAL * float(np.median(np.abs(seen - usual))), SMALLEST_JUMP * usual)
+    allowed = max(MIN_JUMP * MAD_TO_DEVIATION * float(np.median(np.abs(seen - usual))), MIN_RELATIVE_JUMP * usual)
     for names, place in zip(ends, places, strict=True):
         alike = np.ptp(place, axis=0) == 0.0
         for first, last in apart_runs(alike, alike):
@@ -230,25 +234,25 @@ def unseen_as_gaps(
 
 
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
-    """Mark the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
+    """Find the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
 
     Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
     missing, because a foot may have stood still before the gap.
     """
-    places = np.clip(places, -HUGE, HUGE)
+    places = np.clip(places, -MAX_VALUE, MAX_VALUE)
     change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)
     still = np.append(False, change[:-1] == 0.0)
     frozen = np.zeros(len(places), bool)
     for first, last in apart_runs(still, still):
         pace = float(np.max(change[last + 1 : last + 3], initial=0.0))
         missing = change[last] / pace - 1.0 if pace > 0.0 else 0.0
-        if FEWEST_FROZEN <= missing <= LONGEST_LEAP * (last - first + 1):
-            frozen[max(first, last + 1 - round(LONGEST_LEAP * missing)) : last + 1] = True
+        if MIN_FROZEN <= missing <= MAX_LEAP * (last - first + 1):
+            frozen[max(first, last + 1 - round(MAX_LEAP * missing)) : last + 1] = True
     return frozen
 
 
 def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[NDArray[np.bool_], list[str]]:
-    """Mark the samples at which a marker freezes, or the length of a line jumps and returns. Also describes all jumps.
+    """Find the samples at which a marker freezes, or the length of a line jumps and returns. Also return doubts.
 
     Legs are rigid and knees bend smoothly, so the length of a line never really jumps.
     """
@@ -267,7 +271,9 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         change = np.diff(length)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(change, NEIGHBOURS // 2, "edge"), NEIGHBOURS)
         sudden = change - np.median(around, axis=1)
-        limit = max(JUMP * NORMAL * float(np.median(np.abs(sudden))), SMALLEST_JUMP * float(np.median(length)))
+        limit = max(
+            MIN_JUMP * MAD_TO_DEVIATION * float(np.median(np.abs(sudden))), MIN_RELATIVE_JUMP * float(np.median(length))
+        )
         jumps = np.flatnonzero(np.abs(sudden) > limit).tolist()
         brief = np.zeros(length.size, bool)
         lasting = np.zeros(length.size, bool)
@@ -295,17 +301,17 @@ def body_doubts(lines: Mapping[str, Line], plane: WalkPlane) -> list[str]:
     for name, (top, bottom) in lines.items():
         length = np.linalg.norm(top - bottom, axis=1)
         parts = [float(np.median(part)) for part in np.array_split(length, min(LENGTH_PARTS, length.size))]
-        scatter = NORMAL * float(np.median(np.abs(length - np.median(length))))
+        scatter = MAD_TO_DEVIATION * float(np.median(np.abs(length - np.median(length))))
         lengths.append(float(np.median(length)))
         spread = max(parts) - min(parts)
-        if spread > max(SLOW_CHANGE * lengths[-1], scatter):
+        if spread > max(MAX_SLOW_CHANGE * lengths[-1], scatter):
             doubts.append(
                 f"The length of {name} changes by {spread / lengths[-1]:.1%} along the walk: a marker moves on the "
                 "leg, or the camera does not look square to the walk."
             )
     tops = [top @ np.stack([plane.ahead, plane.up], axis=1) for top, _ in lines.values()]
     apart = [np.std(tops[0] - top, axis=0).max() for top in tops[1:]]
-    if apart and max(apart) > ONE_HIP * lengths[0]:
+    if apart and max(apart) > MAX_HIP_MOTION * lengths[0]:
         doubts.append(
             f"The upper ends of {' and '.join(lines)} move against each other by {max(apart) / lengths[0]:.1%} of a "
             "leg (r.m.s.), but a walker's legs meet at one hip: use one marker for both."
@@ -322,9 +328,9 @@ def refuse_running(lines: Mapping[str, Line], plane: WalkPlane, source: str) -> 
     hip = np.mean([top @ plane.up for top, _ in legs], axis=0)
     if np.count_nonzero(np.diff(np.sign(spread - np.mean(spread)))) < FEWEST_SWINGS or not np.ptp(hip):
         return
-    # On a slope the hip also sinks steadily.
+    # On a slope the hip also sinks steadily, so the trend is removed.
     trend = np.polynomial.Polynomial.fit(np.arange(hip.size), hip, 1)
-    if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING:
+    if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING_CORRELATION:
         raise ConfigError(
             f"{source}: the hip is lowest as the legs pass each other: this is running, not walking.",
             "The search for heel strikes assumes that one foot is always on the ground. Cut out the walking part.",

@@ -3,13 +3,13 @@
 MuJoCo scales a contact by w, the sum of `body_invweight0` (1/kg) of its two bodies. With constant impedance d,
 stiffness K and damping B (solref -K, -B), a foot rests at a penetration of (1 - d) w N / K under a load N. So a solref
 of (-w k, -w c) makes any foot a spring k and a damper c, whose forces are divided by 1 - d. In friction, the damper is
-r b, where -w b is the damping of `solreffriction` and r is `impratio`.
+r b, where -w b is the damping given by `solreffriction` and r is `impratio`.
 
 Two side effects shrink with d and 1 / r. The foot gains a mass of d / ((1 - d) w), and r times as much against
 sliding. A sliding foot is pushed off the ground with friction times b times its slip velocity.
 
 w is 1/mass for a free ball. For a link of a walker it is a mean over three directions in the model's zero position, and
-differs between equal legs. With the flag `diagexact` (MuJoCo 3.10), MuJoCo uses a contact's own inverse mass instead.
+differs between equal legs. With the flag `diagexact` (MuJoCo 3.10), MuJoCo uses the exact inverse mass of a contact.
 
 Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters; MuJoCo 4.0.0,
 engine_setconst.c, function set0.
@@ -35,7 +35,7 @@ from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.parts import knee_dampings
 
-# kg m^2, twice MuJoCo's minimum
+# kg m^2, twice the minimum that MuJoCo accepts
 MIN_INERTIA = 2e-15
 # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
 IMPEDANCE = 1e-3
@@ -58,9 +58,9 @@ Slope = Literal["gravity", "geometry"]
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, lateral position (m), and the parts of its leg.
+    """Ball of a foot: name, collision group, lateral position (m), and the parts of the leg to draw.
 
-    limbs  for each part of the leg that is drawn: its link, and its lower end (m) in the link's frame
+    limbs  lower end (m) of each part of the leg in the frame of its link, by link
     """
 
     name: str
@@ -83,9 +83,9 @@ UNNAMED: Mapping[int, Hinge] = {}
 
 
 def contact_settings(target: EngineContact) -> dict[str, float]:
-    """Compute settings of MuJoCo's contact for the target, by the formulas at the top of this module.
+    """Compute the settings that tune MuJoCo's contact to the target, by the formulas at the top of this module.
 
-    Exports and engines use the same settings for every foot; `foot_text` and `pair_text` turn them into a solref.
+    Exports and engines use the same settings for every foot. `foot_text` and `pair_text` turn them into a solref.
     Raises ConfigError for a target without damping.
     """
     if target.damping_ratio == 0.0:
@@ -144,7 +144,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
 
 
 def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
-    """Return the rates of a link at `point` from those at `start`. Both points are in the frame of the upright link."""
+    """Convert the rates of a link at the point `start` to those at `point`, both in the frame of the upright link."""
     return rates + np.outer((start[1] - point[1], point[0] - start[0], 0.0), rates[2])
 
 
@@ -161,7 +161,7 @@ def body_text(
     feet: tuple[Foot, ...] = FEET,
     hinges: Mapping[int, Hinge] = UNNAMED,
 ) -> str:
-    """Write a link with its hinge, its feet and its child links.
+    """Write a link with its hinge, feet and child links.
 
     contact  settings of the foot contacts; None for a walker without feet
     hinges   hinges with a name, by the link that hangs from them
@@ -197,10 +197,13 @@ def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> It
 
 
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
-    """Write a foot, tuned for ground that is added to the file. `pair_text` tunes the contacts with its own ground."""
+    """Write a foot with contact settings for any ground that is added to the file later.
+
+    The contacts with ground in the file itself are set by `pair_text`.
+    """
     (x, z), mu = ball.centre_m, contact["friction"]
-    # MuJoCo lets two shapes touch if `contype` of one and `conaffinity` of the other share a bit. Pads have only the
-    # latter.
+    # MuJoCo lets two shapes touch if `contype` of one and `conaffinity` of the other share a bit. Pads have only a
+    # `conaffinity`.
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
         f'contype="{foot.group}" conaffinity="0" condim="3" friction="{mu!r} 0 0" priority="1" '
@@ -220,7 +223,7 @@ def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: 
 
 
 def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) -> str:
-    """Write spring and damper of a foot, which follow from the contact settings and the weight of the foot's link."""
+    """Write spring and damper of a foot: the contact settings times the inverse weight of the foot's link."""
     inverse_weight = inverse_weights(model).bodies[ball.link]
     d = contact["solimp_d"]
     stiffness = inverse_weight * contact["stiffness_N_m"]
@@ -262,7 +265,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         half = 0.5 * export.scene.ours.slope
         down = math.hypot(model.gravity_along, model.gravity_down)
         model = replace(model, gravity_along=0.0, gravity_down=down)
-        # This turn about the y axis lowers the ground ahead.
+        # Positive turns about the y axis lower the ground ahead.
         scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
     pairs = "".join(
         pair_text(model, model.balls[pad.foot], feet[pad.foot], f"pad_{number + 1}", contact)
@@ -290,7 +293,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
 
 
 def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
-    """Return a time step, rounded to one digit, that resolves the damping of the lightest foot and the knees' stops."""
+    """Return a time step that resolves the damping of the lightest foot and of the knee stops, rounded to one digit."""
     weights = inverse_weights(export.model)
     stop = export.scene.ours.stop
     rates = [contact["damping_N_s_m"] * weights.bodies[ball.link] for ball in export.model.balls]
@@ -301,7 +304,7 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
 
 
 def hinge_names(export: Exported) -> dict[int, Hinge]:
-    """Name the hip and the knees, with the hip's spring, the dampers and the stops of compliant knees."""
+    """Return the hinges of hip and knees, with names, the hip spring, dampers and the stops of compliant knees."""
     hip = export.hip
     weights = inverse_weights(export.model).joints
     stop = export.scene.ours.stop
@@ -334,7 +337,8 @@ def limbs(export: Exported, foot: int) -> dict[int, Position]:
 def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
     """Draw a part of a leg as a capsule from its hinge to its lower end. It collides with nothing.
 
-    Above the foot it ends early, so that it does not reach below the ball in programs that let it collide.
+    A capsule that ends at the foot is shortened. Otherwise it could reach below the ball in programs that let it
+    collide.
     """
     (x, z), (a, c), y = hinge, end, foot.across_m
     width = 0.015 * math.hypot(x - a, z - c)

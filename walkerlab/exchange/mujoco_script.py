@@ -1,7 +1,7 @@
 """Simulate in MuJoCo a walker that walkerlab exported, with its drives and knees, and print its touchdowns.
 
-Usage: python NAME.py [MODEL.xml] [steps] [--view]. By default it walks ten steps of NAME.xml, which stands next to it.
-It needs the package mujoco.
+Usage: python NAME.py [MODEL.xml] [steps] [--view]. The default is ten steps of NAME.xml in the same folder.
+The script needs the package mujoco.
 """
 
 import sys
@@ -18,7 +18,7 @@ WINDOW_CLOSES_S = 5.0
 
 
 class Walk:
-    """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
+    """Walk from the keyframe `gait`, with a control callback for push-offs, hip torque, touchdowns and knees.
 
     It reacts to the state at each time step. A knee locks when it has been bent and straightens, by a plastic impact
     or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
@@ -39,7 +39,7 @@ class Walk:
         self.height = base.dofadr[0]
         self.feet = [model.geom(f"foot_{foot}").id for foot in (1, 2)]
         joints = {model.joint(joint).name: joint for joint in range(model.njnt)}
-        # joints by leg, of the legs that have a knee
+        # knee joints, by leg
         self.knees = {leg: joints[name] for leg, name in enumerate(("knee_1", "knee_2")) if name in joints}
         self.locks = {leg: model.equality(f"lock_{leg + 1}").id for leg in self.knees}
         self.stops = {leg: bool(model.jnt_limited[knee]) for leg, knee in self.knees.items()}
@@ -53,7 +53,7 @@ class Walk:
         mujoco.set_mjcb_control(self.control)
 
     def begin(self) -> None:
-        """Stand on the second leg, whose knee is locked while the other one is free."""
+        """Begin a walk: the second leg stands with its knee locked, the knee of the first leg is free."""
         self.time_s = -1.0
         self.stance = 1
         self.touches_s: list[float] = []
@@ -62,7 +62,7 @@ class Walk:
         self.sinks = self.pushes = False
         self.bent = [False, False]
         for knee in self.knees.values():
-            # A stop acts only after its knee has bent.
+            # A stop acts only after its knee has bent. Otherwise it would act on the straight knee at the start.
             self.model.jnt_limited[knee] = 0
 
     def control(self, _model: Any, data: Any) -> None:
@@ -70,10 +70,10 @@ class Walk:
         # MuJoCo's control callback is global, so it also runs for other data.
         if data is not self.data:
             return
-        # The time falls when somebody resets the walk, as in the viewer.
+        # The time decreases when the walk is reset, for example in the viewer.
         if data.time < self.time_s:
             self.begin()
-        # A callback at the same time again, as from `mj_forward`, is no new time step.
+        # `mj_forward` calls again at the same time, which is not a new time step.
         if data.time > self.time_s:
             self.time_s = data.time
             if data.ncon > 0:
@@ -98,7 +98,7 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Let the friction's damper grow with the load on the feet, as in ADAMS.
+        """Scale the damper of the friction with the load on the feet, as in ADAMS.
 
         At a strike the load is many times the weight.
         """
@@ -108,7 +108,7 @@ class Walk:
     def drive(self, swing: int) -> None:
         """Apply the hip torque, and push the trailing foot during a pulse."""
         self.data.qfrc_applied[:] = 0.0
-        # The hip turns leg 1 against leg 2, so the torque on the swing leg changes its sign with the legs' roles.
+        # The hip turns leg 1 against leg 2, so the torque on it changes its sign when the legs change roles.
         self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
         share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
         if self.pushed and 0.0 < share < 1.0:
@@ -150,12 +150,12 @@ class Walk:
                 self.lock(leg)
 
     def lock(self, leg: int) -> None:
-        """Stop a knee by a plastic impact that leaves the other constraints in force, and hold it from now on."""
+        """Stop a knee by a plastic impact, during which other constraints stay in force, and hold it from now on."""
         model = self.model
         data = self.data
         knee = self.knees[leg]
         model.jnt_limited[knee] = 0
-        # a knee that locks by its stop keeps the stop's compression
+        # A knee that was caught by a stop is held where it is, with the stop still compressed.
         model.eq_data[self.locks[leg], 0] = data.qpos[model.jnt_qposadr[knee]] if self.stops[leg] else 0.0
         data.eq_active[self.locks[leg]] = 1
         # With so few degrees of freedom MuJoCo's Jacobian is dense. The lock, active only from now on, is not in it

@@ -13,9 +13,9 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 PINNED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-# as a multiple of mass x length^2; engines reject bodies without inertia
+# As a multiple of mass x length^2. Engines reject bodies without inertia.
 SMALLEST_INERTIA = 1e-13
-# radius of the ball that replaces a point foot in engines; larger than any penetration
+# Radius of the ball that replaces a point foot in engines. It must exceed the penetration.
 SMALLEST_BALL_M = 5e-4
 
 
@@ -23,8 +23,8 @@ SMALLEST_BALL_M = 5e-4
 class Link:
     """Rigid link, lumped from bodies that move together and the particles on them.
 
-    parent_point_m  hinge in the parent's frame (m); for the base, the world's origin
-    point_m         hinge in the link's own frame (m); for the base, the point that its freedoms move
+    parent_point_m  hinge in the frame of the parent (m); for the base, the origin of the world
+    point_m         hinge in the frame of the link (m); for the base, the point that the freedoms move
     """
 
     name: str
@@ -43,7 +43,7 @@ class Ball:
     link: int
     centre_m: Position
     radius_m: float
-    ground_m: float  # height of the ground; a point foot gets a tiny ball, and its ground is lower by the ball's radius
+    ground_m: float  # height of the ground; under the tiny ball of a point foot it is lower by the ball's radius
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def planar_model(
     """
     root = base.body
     welded = [{knee.thigh, knee.shank} for knee in welds]
-    # for each link: its bodies, with their origins in its frame (m); and its parent, with the hinge in both frames
+    # By link: the bodies with their origins in the frame of the link (m), and the parent with the hinge in both frames.
     members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
     hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
     frames: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}
@@ -103,7 +103,7 @@ def planar_model(
             grow(neighbour)
 
     grow(root)
-    # The rows have room for as many links as bodies. If knees are locked there are fewer links.
+    # The rows have a column for each body, but with locked knees there are fewer links than bodies.
     chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
     links = tuple(lump_bodies(assembly, *link) for link in zip(members, hinges, strict=True))
     balls = []
@@ -142,8 +142,8 @@ def lump_bodies(
 
 
 def coupling_rows(assembly: Assembly, model: PlanarModel) -> list[Floats]:
-    """Return one row of weights (links,) for each body whose angle follows from others.
+    """Return a row of weights (links,) for each body that follows other bodies.
 
-    The sum of the links' relative angles, multiplied by these weights, is zero.
+    The relative angles of the links, multiplied by these weights, add up to zero.
     """
     return [model.chain[body] - row @ model.chain for body, row in followers(assembly).items()]

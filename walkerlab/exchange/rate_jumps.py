@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-NORMAL_QUARTILE: Final = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
+NORMAL_QUARTILE: Final = 0.6745  # median absolute value of a normal variable with standard deviation 1
 WINDOW_AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, as a fraction of the largest during the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
-MOST_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
+MAX_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
 WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
 SAMPLES_ON_A_SIDE: Final = 4  # minimum number of samples for a fit, before and after an instant
 DEGREE: Final = 3
-SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
+MIN_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
-RIDGE: Final = 1e-15  # relative; samples at nearly equal times would make equations singular
+RIDGE: Final = 1e-15  # relative; without it, samples at nearly equal times would make equations singular
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
@@ -42,17 +42,17 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     sums = total(angle)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.abs(spread).max(), spread > 0.0)
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
-    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
+    evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MAX_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
-    # Of equal neighbours only the first is a peak.
+    # The comparisons differ, so that only the first of equal neighbours is a peak.
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
     return [float(SUMS[peak]) for peak in peaks[np.argsort(-evidence[peaks])][:MOST_FOUND]]
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return the squared scatter of the angles explained by rate jumps, divided by the variance that remains.
+    """Return the squared scatter of the angles that rate jumps explain, over the variance that remains.
 
-    over  (samples,) the sum of the angles less the tried sum, rad
+    over  (samples,) rad, sum of the angles minus the sum to try
     runs  pairs of first and last samples; a jump is fitted in each, at the last instant at which `over` falls through 0
     """
     jumps = []
@@ -80,7 +80,7 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
 
 def noise_of(angle: Array) -> float:
     """Return the standard deviation (rad) of the scatter of angles (samples, 2) from sample to sample."""
-    # noise dominates the third differences of a smooth motion, whose variance is 20 times that of the noise
+    # In third differences the smooth motion hardly shows. Their variance is 20 times that of the noise.
     return (
         float(np.median(np.abs(np.diff(angle, 3, axis=0)))) / (NORMAL_QUARTILE * 20.0**0.5) if len(angle) > 3 else 0.0
     )
@@ -105,12 +105,12 @@ def squares_around(
     rest = np.array([[t.size] for t, _ in parts]) - counts
     degrees = np.minimum(degree, 1 + np.stack((counts, rest)) // samples_per_degree)
     before = squares_before(parts, instants, counts, degrees[0])
-    # The fit after an instant is the one before it, with time running backwards.
+    # The fit after an instant is a fit before it with time reversed.
     mirrored = [(-t[::-1], y[::-1]) for t, y in parts]
     after = [
         values[:, ::-1] for values in squares_before(mirrored, -instants[:, ::-1], rest[:, ::-1], degrees[1, :, ::-1])
     ]
-    # Forcing both sides to meet costs their squared gap over the sum of the variances of its ends.
+    # Making both sides meet adds their squared gap over the sum of the variances of both values.
     gaps = np.sum((before[1] - after[1]) ** 2, axis=2)
     return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
 
@@ -131,7 +131,7 @@ def squares_before(
     at = np.array(bases)
     used = (np.arange(degree + 1) <= degrees[..., None]) & (counts[..., None] > 1)
     square = moments[..., : degree + 1, : degree + 1] * (used[..., :, None] & used[..., None, :])
-    # A coefficient that is not used still needs an equation, which makes it zero.
+    # Each unused coefficient gets an equation that makes it zero, since otherwise the matrix would be singular.
     square += np.eye(degree + 1) * (~used + RIDGE * counts[..., None])[..., None]
     right = np.concatenate((moments[..., : degree + 1, degree + 1 :], at[..., None]), axis=-1) * used[..., None]
     solution = np.linalg.solve(square, right)
@@ -140,7 +140,7 @@ def squares_before(
     fitted = counts > 1
     squares = np.where(fitted, np.maximum(total - np.sum(explained[..., :-1], axis=-1), 0.0), 0.0)
     values = np.sum(right[..., -1:] * solution[..., :-1], axis=-2)
-    # A side without a fit can have any value at the instant, so an infinite variance makes the gap free of cost.
+    # A side without a fit can have any value at the instant. With an infinite variance its gap costs nothing.
     return squares, values, np.where(fitted, explained[..., -1], np.inf)
 
 
@@ -154,7 +154,7 @@ def products_of(
     end = int(counts.max())
     first, last = part[0][0], max(part[0][end - 1], instants.max())
     times = np.concatenate((part[0][:end], instants))
-    # Powers would make the normal equations too ill-conditioned for this degree.
+    # Chebyshev polynomials, because powers would make the normal equations too ill-conditioned.
     basis = chebvander(2.0 * (times - first) / (last - first or 1.0) - 1.0, degree)
     columns = np.concatenate((basis[:end], part[1][:end]), axis=1)
     return [columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], basis[end:]
@@ -174,4 +174,4 @@ def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[flo
     basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
     shares = basis.T @ y
     residual = float((y**2).sum() - (shares**2).sum())
-    return float((shares[-1] ** 2).sum()), max(residual, SMALLEST_SCATTER * float((y**2).sum())), y.size - shares.size
+    return float((shares[-1] ** 2).sum()), max(residual, MIN_SCATTER * float((y**2).sum())), y.size - shares.size

@@ -35,7 +35,7 @@ csv.field_size_limit(2**31 - 1)  # a cell may hold a long comment
 
 Array = NDArray[np.float64]
 Row = tuple[int, list[str]]
-"""Line number of a row, as an editor shows it, and the row's cells."""
+"""Line number of a row, as an editor shows it, and the cells of the row."""
 
 TIME: Final = "time"
 TIME_NAMES = [
@@ -45,9 +45,9 @@ TIME_NAMES = [
         rf"(?i:(?:time|time[\s_]?stamp|t)[\s_](?:{'|'.join(UNIT_VALUES['time'])}))", "T",
     )
 ]  # fmt: skip
-"""Names of a file's time column; T comes last, because it may be a temperature."""
+"""Patterns of names of a time column. T comes last, because it may be a temperature."""
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
-"""Pattern for a unit in brackets behind a name; [2] and [:,2] count the parts of a vector."""
+"""Pattern for a unit in brackets behind a name. It excludes [2] and [:,2], which count the parts of a vector."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
@@ -93,7 +93,7 @@ PROGRAMS: Final = {
     re.compile(r"mass[ _]\w+\W+mass[ _]\w+[^\n]*\n"): ("Tracker with several tracks", TRACKS),
     re.compile(r"mass[ _]\w+\W*\n#?t\Wx\Wy"): ("Tracker with a single point", ONE_TABLE),
 }
-"""Program and advice by the beginning of a table that must be exported in another way."""
+"""Tables that must be exported differently: how they begin, the program that wrote them, and our advice."""
 
 
 C3D_PATIENCE_S: Final = 60.0
@@ -119,9 +119,9 @@ class Recording:
     units: dict[str, str] = field(default_factory=dict)  # unit by column as written in the file, if it states one
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
-    # reason, by column, why it cannot be used, such as a cell with text
+    # by column: why it cannot be used, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
-    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker, why it has gaps
+    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker: why it has gaps
     levelled_by: str = ""  # program that turns angles until the floor is level
 
     @property
@@ -131,8 +131,7 @@ class Recording:
 
 
 def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
-    """Read the columns of a file, in the format of its extension. `key` is the config key that names the file, if there
-    is one.
+    """Read the columns of a file in the format of its extension. `key` is the config key that names the file, if any.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
@@ -154,7 +153,7 @@ def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, .
     name = f"{'.'.join(key)}: {shown}" if key else shown
     try:
         mode = path.stat().st_mode
-        # A folder passes, because the attempt to read it raises an OSError with the right reason.
+        # Folders are not refused here: the attempt to read one raises an OSError with the right reason.
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             advice = "Save what it delivers as a file first."
             raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
@@ -202,11 +201,11 @@ def read_delimited(path: Path) -> Recording:
 
 def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
     """Return the columns (count, samples) of a table whose cells are all plain numbers, or None for another table."""
-    # NumPy warns of input without rows.
+    # NumPy would warn of input without rows.
     if not any(map(str.strip, lines)):
         return None
     try:
-        # A '#' makes the cell a text, for which the caller has a message, not the beginning of a comment.
+        # `comments=None`, so that a '#' is text in a cell, for which the caller has a message.
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
@@ -220,17 +219,17 @@ def merge_headers(lines: list[str]) -> list[str]:
     if not coords or rows[0][:1] != ["scorer"]:
         return lines
     names = [".".join(parts) for parts in zip(*(row[1:] for row in rows[1 : coords + 1]), strict=False)]
-    # Blank lines take the place of the old header, so that messages name the right line numbers.
+    # Blank lines replace the old header, so that line numbers in messages stay right.
     return [*[""] * coords, ",".join(["frame", *(f'"{name}"' for name in names)]), *lines[coords + 1 :]]
 
 
 def remove_blanks(lines: list[str]) -> list[str]:
-    """Return lines with semicolons between columns if blanks separate numbers with decimal commas."""
+    """Return the lines, with semicolons between columns if blanks separate numbers with decimal commas."""
     last = next((line for line in reversed(lines) if line.strip()), "")
     if not COMMAS_AND_BLANKS.fullmatch(last):
         return lines
     count = len(last.split())
-    # Names may contain single blanks, so a line is split at wider gaps if that gives the right number of cells.
+    # Names may contain single blanks. So a line is split at wider gaps if that gives the right number of cells.
     names = [re.split(" {2,}", line.strip()) for line in lines]
     return [";".join(wide if len(wide) == count else line.split()) for line, wide in zip(lines, names, strict=True)]
 
@@ -249,7 +248,7 @@ def text_of(path: Path) -> str:
             text = data.decode(encoding)
         except (UnicodeDecodeError, LookupError):
             continue
-        # Latin-1 decodes any bytes, so binary data show only by a NUL.
+        # Latin-1 decodes any bytes, so binary data are recognised only by a NUL.
         if "\0" in text:
             break
         return text
@@ -273,7 +272,7 @@ def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[
     """
     tops = [(delimiter, list(rows_of(lines[:HEADER_LINES], delimiter))) for delimiter in DELIMITERS]
     places = [(rows[k : k + 3], delimiter) for delimiter, rows in tops for k in range(len(rows) - 1)]
-    # The sort is stable: if two delimiters fit the same line, the first of DELIMITERS wins.
+    # The sort is stable, so if two delimiters fit the same line, the first of DELIMITERS is used.
     places.sort(key=lambda place: place[0][0][0])
     for fewest, only_words in product((2, 1), (True, False)):
         for ((_, names), *below), delimiter in places:
@@ -389,7 +388,7 @@ def clock_times(cells: Sequence[str]) -> Array | None:
     times = np.array([seconds_of(cell) for cell in cells])
     if not np.isfinite(times).all():
         return None
-    # A fall by more than half a day is midnight. A smaller one is an error in the file, which `columns` reports.
+    # If the time falls by more than half a day, midnight has passed. `columns` reports a smaller fall as an error.
     return np.asarray(times + DAY_S * np.cumsum(np.diff(times, prepend=times[:1]) < -0.5 * DAY_S))
 
 
@@ -403,7 +402,7 @@ def seconds_of(cell: str) -> float:
         date = datetime.fromisoformat(cell)
     except ValueError:
         return math.nan
-    # Without a zone Python would assume that of this machine, whose clock jumps when summer time begins and ends.
+    # Without a zone Python would assume the local one, in which times jump when summer time begins and ends.
     return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
@@ -420,7 +419,7 @@ def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callabl
     except ValueError:
         values = np.full(len(cells), np.nan)
     commas = [index for index, cell in enumerate(cells) if DECIMAL_COMMA.fullmatch(cell)]
-    # 1,234 can be 1.234 or 1234. Points elsewhere in the file speak for thousands.
+    # 1,234 can be 1.234 or 1234. If other numbers have points, the comma probably separates thousands.
     may_be_thousands = all(THOUSANDS.fullmatch(cells[index]) for index in commas)
     if commas and (any("." in cell and is_number(cell) for cell in cells) or (may_be_thousands and has_points())):
         return values, f"line {lines[commas[0]]}: {cells[commas[0]]!r} has a comma, but other numbers have points"
@@ -444,7 +443,7 @@ def read_adams_results(path: Path) -> Recording:
             f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
         ) from None
     components = component_names(path, root)
-    # The state at time 0 is only in the block initialConditions. Blocks named modelInput are no part of the walk.
+    # Only the block initialConditions has the state at time 0. Blocks named modelInput are not part of the walk.
     blocks = (block for block in root.iterfind(".//{*}Data") if not block.get("name", "").startswith("modelInput"))
     steps = [step for block in blocks for step in block.iterfind("{*}Step")]
     if not steps:
@@ -494,13 +493,13 @@ def parse_step(path: Path, number: int, step: ElementTree.Element, count: int) -
 
 
 def xml_units(root: ElementTree.Element) -> dict[str, str]:
-    """Return the model's unit for each kind of quantity."""
+    """Return the unit of the model for each kind of quantity."""
     units: Mapping[str, str] = next((node.attrib for node in root.iterfind(".//{*}Units")), {})
     return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
 
 
 def drop_repeated_times(recording: Recording) -> Recording:
-    """Keep the last of several samples at one time, since a block begins with the last sample of the previous one."""
+    """Keep the last of several samples at one time, because blocks begin with the last sample of the previous block."""
     time = recording.columns.get(recording.time_name or "", np.zeros(0))
     last = np.append(np.diff(time) != 0.0, True) if time.size else np.zeros(0, bool)
     return replace(recording, columns={name: column[last] for name, column in recording.columns.items()})
@@ -525,7 +524,7 @@ def read_opensim(path: Path) -> Recording:
     if "\t" not in lines[start]:
         lines = ["\t".join(line.split()) for line in lines]
     units = {"length": "m", "time": "s", "angle": angle_unit(path, settings)}
-    # the rows are counted, because their number in the header is often wrong
+    # The rows are counted, because their number in the header is often wrong.
     table = table_of(path, names, lines, start + 2, "\t", {}, {kind: unit for kind, unit in units.items() if unit})
     return replace(table, levelled_by=SEGMENTS if table.columns.keys() >= SEGMENT_NAMES else "")
 
@@ -533,7 +532,7 @@ def read_opensim(path: Path) -> Recording:
 def angle_unit(path: Path, settings: Mapping[str, str]) -> str:
     """Return the unit of the angles in an OpenSim table as OpenSim 4.6 reads it, or '' if its header contradicts that.
 
-    Without a version a .mot file is SIMM's, in degrees; other tables are in radians unless they say inDegrees=yes.
+    A .mot file without a version is from SIMM, in degrees. Other tables are in radians unless they say inDegrees=yes.
     """
     in_degrees = settings.get("indegrees", "")
     if path.suffix.lower() == ".mot" and "version" not in settings and in_degrees != "yes":
@@ -558,7 +557,7 @@ def read_markers(path: Path) -> Recording:
         )
     settings = dict(zip(split_at_tabs(lines[1]), split_at_tabs(lines[2]), strict=False))
     labels = split_at_tabs(lines[3].rstrip())
-    # Usually a name stands over the first of three coordinates. Some programs write the names without these gaps.
+    # Usually a name stands over the first of three coordinates. Some programs write the names side by side.
     spread = not any(labels[3::3]) and not any(labels[4::3])
     markers = labels[2::3] if spread else labels[2:]
     count = sum(map(bool, split_at_tabs(lines[4]))) // 3
@@ -572,12 +571,12 @@ def read_markers(path: Path) -> Recording:
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
     names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
     tabs = len(names) - 1
-    # some programs omit the tabs after the last marker that was seen
+    # Some programs omit the tabs after the last marker that was seen.
     if {line.count("\t") for line in lines[5:]} != {tabs}:
         lines = [line + "\t" * (tabs - line.count("\t")) if line.strip() else "" for line in lines]
     unit = settings.get("Units")
     by_sports2d = "Sports2D" in lines[0]
-    # Sports2D states metres even in files whose coordinates are pixels
+    # Sports2D states metres even if the coordinates are pixels.
     in_pixels = by_sports2d and "_px" in lines[0]
     kind_units = {"time": "s", **({"length": unit} if unit and not in_pixels else {})}
     table = table_of(path, names, lines, 6, "\t", {}, kind_units)
@@ -611,7 +610,7 @@ def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
     with path.open("rb"):  # raises OSError for an unreadable file; ezc3d does not
         pass
-    # Damaged files crash ezc3d with segmentation faults, so a child process runs it.
+    # A child process runs ezc3d, because damaged files crash it with segmentation faults.
     try:
         # With -P, modules in the working folder cannot take the place of the real ones.
         command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]

@@ -25,31 +25,31 @@ from walkerlab.exchange.rate_jumps import (
     typical_interval,
 )
 
-HIGHEST_DEGREE: Final = 7  # degree of the polynomial through a step; its error is 0.1 mrad for straight legs
+HIGHEST_DEGREE: Final = 7  # of the polynomial through a step, whose error is then 0.1 mrad for straight legs
 SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
-FAR_PERCENT: Final = 80  # percentile of the angle between the legs above which they count as far apart
-SEARCH_RANGE: Final = 0.3  # time before and after a first guess of a strike to search, as a fraction of a step
-MARGIN: Final = 0.2  # time around the neighbouring strikes that the fit of a strike leaves out, as a fraction of a step
+FAR_PERCENT: Final = 80  # legs count as far apart above this percentile of the angle between them
+SEARCH_RANGE: Final = 0.3  # strikes are searched for this long before and after a first guess, as a fraction of a step
+MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step; a longer one is a lasting jump
-BORDER: Final = 0.1  # part of a step at the far end of a fit that other fits cover
-LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
-LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
+MAX_STRETCH: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
+BORDER: Final = 0.1  # fraction of a step at the far end of a fit that is left to other fits
+LASTING_BORDER: Final = 0.15  # as `BORDER`, for lasting jumps
+LENGTH_TRIALS: Final = 16  # number of lengths of a stretch that are tried first
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
 NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
 STANDARD_ERRORS: Final = 7.0
-TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
+MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
 TYPICAL_PERCENT: Final = 30
-WIDEST_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
+MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
 MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
-NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
-SUSPECT: Final = 0.5  # fraction of the limit above which stretch and strike are searched for together
-SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
-MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-SMALLEST_NORM: Final = 0.12  # smallest squared part of a stretch that polynomials do not follow, in samples
-NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
+MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
+JOINT_SEARCH_FRACTION: Final = 0.5  # above this fraction of the limit, stretch and strike are searched for together
+MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
+MAX_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
+MIN_NORM: Final = 0.12  # smallest squared part of a stretch, in samples, that polynomials must not follow
+MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Stretch:
 
     leg: int
     first: int
-    end: int  # first sample after it
+    end: int  # first sample after the stretch
     offset_rad: float
     explained: float  # rad^2, squared residuals that the offset explains
     lasts: bool  # whether the angle never returns to its course
@@ -74,7 +74,7 @@ class Strike:
     span_s: tuple[float, float]
     smooth_instant: float  # s, the instant of the strike in a smooth course
     step_s: float
-    at_ends: tuple[bool, bool]  # whether the recording begins and ends with them
+    at_ends: tuple[bool, bool]  # whether the recording begins and ends with these samples
 
     def fit(self, at: float) -> tuple[Array, Array]:
         """Return the orthonormal basis (samples, columns) of polynomials that meet at an instant, and the residuals."""
@@ -83,7 +83,7 @@ class Strike:
         for side in (t < 0.0, t >= 0.0):
             degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
             t_side = np.where(side, t / self.step_s, 0.0)
-            # repeated products take a tenth of the time of powers
+            # Repeated products take a tenth of the time that powers take.
             columns.append(np.multiply.accumulate(np.broadcast_to(t_side[:, None], (t_side.size, degree)), axis=1))
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
         return basis, self.angle - basis @ (basis.T @ self.angle)
@@ -94,10 +94,10 @@ class Strike:
         return self.fit(self.smooth_instant)
 
     def scatter(self) -> Array:
-        """Return the residuals of the smooth course, scaled up for the part that the fit has followed."""
+        """Return the residuals of the smooth course, scaled up because the fit follows part of the scatter."""
         basis, residuals = self.smooth_fit
         free = 1.0 - np.sum(basis**2, axis=1)
-        clear = free > SMALLEST_NORM
+        clear = free > MIN_NORM
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
 
     def best_with_strike(self) -> tuple[Stretch, float]:
@@ -114,19 +114,19 @@ class Strike:
     def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
         """Return the stretch that explains most of the residuals of a fit (basis and residuals)."""
         sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
-        longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
-        lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
+        longest = max(1, int(np.searchsorted(self.time, self.time[0] + MAX_STRETCH * self.step_s)))
+        lengths = np.unique(np.geomspace(1, longest, LENGTH_TRIALS).astype(int))
         low, high = self.inner_samples(BORDER)
-        # Long stretches are tried at widely spaced places. The best one is refined below.
+        # To save time, long stretches are tried at widely spaced positions. The best one is refined below.
         short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
-        inner = np.arange(*self.inner_samples(LASTING, whole=False))
+        inner = np.arange(*self.inner_samples(LASTING_BORDER, whole=False))
         count = self.time.size
         lasting = first_and_end(inner, count - inner)
         spans = np.concatenate((short[short[:, 1] <= high], lasting))
         first, end, leg = best_span(sums, spans)
         lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
         if not lasts:
-            # all spans with their ends near the ends of this one
+            # Refine: try all spans whose ends are near those of this one.
             near = np.arange(-1 - (end - first) // 4, 2 + (end - first) // 4)
             around = np.stack(np.meshgrid(first + near, end + near), axis=2).reshape(-1, 2)
             fits = (around[:, 0] >= low) & (around[:, 1] <= high) & (around[:, 1] > around[:, 0])
@@ -136,7 +136,7 @@ class Strike:
         return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
 
     def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
-        """Return the samples (first, end) farther than a fraction of a step from the ends. Other fits cover the rest.
+        """Return the samples (first, end) farther from the ends than `part` of a step. Other fits cover the rest.
 
         whole  whether to go up to an end of the recording
         """
@@ -157,10 +157,10 @@ def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int
     for count in counts:
         trials = np.linspace(begin, end, count, axis=1)
         costs = costs_at(trials)
-        # The next interval, and the parabola at the end, need a trial on each side.
+        # The next interval, and the parabola at the end, need a trial on each side of the best.
         best = np.clip(np.argmin(costs, axis=1), 1, count - 2)
         begin, middle, end = (trials[each, best + k] for k in (-1, 0, 1))
-    # the vertex of the parabola through the best trials
+    # Take the vertex of the parabola through the best trials.
     left, least, right = (costs[each, best + k] for k in (-1, 0, 1))
     bend = left - 2.0 * least + right
     move = 0.5 * (left - right) / np.where(bend > 0.0, bend, np.inf)
@@ -168,7 +168,7 @@ def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int
 
 
 def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the spans (spans, 2) that begin at these samples and have a length."""
+    """Return the spans (spans, 2) that begin at the samples `first` and have the given length."""
     return np.stack((first, first + length), axis=1)
 
 
@@ -185,8 +185,8 @@ def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Ar
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
     """Return first sample, end and leg of the span that explains most of the residuals."""
     norm, share = parts_of(sums, spans)
-    # Where polynomials can follow a constant over a span almost entirely, dividing by the rest would magnify rounding.
-    explained = np.where(norm > SMALLEST_NORM, 1.0 / np.maximum(norm, SMALLEST_NORM), 0.0)[:, None] * share**2
+    # Over some spans polynomials follow a constant almost entirely. Dividing by the rest would magnify rounding.
+    explained = np.where(norm > MIN_NORM, 1.0 / np.maximum(norm, MIN_NORM), 0.0)[:, None] * share**2
     best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
     return int(spans[best, 0]), int(spans[best, 1]), int(leg)
 
@@ -198,22 +198,24 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     angle  (samples, 2) rad, from the vertical
     """
     far = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
-    if noise_of(angle) > NOISY * far:
+    if noise_of(angle) > MAX_SCATTER * far:
         return []
-    found = find_leaps(time, angle, LONGEST * course_of(time, angle).step_s)
+    found = find_leaps(time, angle, MAX_STRETCH * course_of(time, angle).step_s)
     course = course_of(time, angle, found)
     strikes = course.strikes(range(len(course.spans)))
     sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
     # Polynomials through sparse samples would follow errors, too.
-    if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
+    if not sampled or np.max(np.diff(time)) > MAX_GAP * course.step_s:
         return found
-    scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
+    scatter = MAD_TO_DEVIATION * float(
+        np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes])))
+    )
     worst = [strike.best_stretch(strike.smooth_fit).explained for strike in strikes]
-    limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
+    limit = max((STANDARD_ERRORS * scatter) ** 2, MIN_EXPLAINED_RATIO * float(np.percentile(worst, TYPICAL_PERCENT)))
     # A false strike in one step makes the neighbouring steps look wrong as well.
     for index in np.argsort(worst)[::-1].tolist():
-        if worst[index] > SUSPECT * limit:
-            new = stretches_near(course, index, limit, SMALLEST * far)
+        if worst[index] > JOINT_SEARCH_FRACTION * limit:
+            new = stretches_near(course, index, limit, MIN_OFFSET * far)
             found = found + new
             course = course.remove_stretches(new)
     return found
@@ -231,7 +233,7 @@ def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
             returns = moved[first, leg] * moved[back, leg] < 0.0 and time[back] - time[first] < longest_s
             if returns:
                 found.append(Stretch(leg, first + 1, back + 1, float(moved[first, leg]), 0.0, lasts=False))
-            # A jump that does not return is skipped, but the next one may begin a stretch.
+            # If the second jump does not undo the first, only the first is dropped: the second may begin a stretch.
             jumps = jumps[2 if returns else 1 :]
     return found
 
@@ -242,7 +244,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch in addition to others, or None if it is within the limit."""
         strike = course.remove_stretches(others).strikes([index])[0]
-        if strike.best_stretch(strike.smooth_fit).explained <= SUSPECT * limit:
+        if strike.best_stretch(strike.smooth_fit).explained <= JOINT_SEARCH_FRACTION * limit:
             return None
         stretch, left = strike.best_with_strike()
         explains = float(np.sum(strike.smooth_fit[1] ** 2)) - left > limit
@@ -252,9 +254,9 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
         return replace(stretch, first=int(rows[stretch.first]), end=int(rows[stretch.end - 1]) + 1)
 
     found: list[Stretch] = []
-    while len(found) < MOST_STRETCHES and (stretch := worst(found)):
+    while len(found) < MAX_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
-    # The first stretches may have been found in place of later ones.
+    # Each stretch was found without the later ones. With them, it may no longer be needed.
     for stretch in found[:-1]:
         others = [other for other in found if other is not stretch]
         found = found if worst(others) else others
@@ -270,7 +272,7 @@ class Course:
     rows: NDArray[np.int64]  # indices of the samples in the recording
     spans: list[tuple[float, float]]
     step_s: float
-    # A course made by `replace` begins without guesses, because those made with wrong samples do not hold without them.
+    # Not in `__init__`, so that `replace` drops them: guesses made with wrong samples are wrong once these are removed.
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
@@ -285,7 +287,7 @@ class Course:
         return replace(self, time=self.time[kept], angle=angle[kept], rows=self.rows[kept])
 
     def strikes(self, indices: Sequence[int]) -> list[Strike]:
-        """Return the steps around the heel strikes in some spans."""
+        """Return the samples around the heel strikes in the spans with these indices."""
         self.guess(indices)
         ends = [self.ends_around(index) for index in indices]
         slices = [self.slice_of(first, last) for first, last, _ in ends]
@@ -310,7 +312,7 @@ class Course:
         return first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
 
     def guess(self, indices: Iterable[int]) -> None:
-        """Add first guesses of the times at which rates jump within some spans and the spans beside them."""
+        """Add first guesses of the times at which rates jump, for some spans and their neighbours."""
         nearby = {near for index in indices for near in (index - 1, index, index + 1)}
         new = sorted(nearby.intersection(range(len(self.spans))) - self.guesses.keys())
         spans = [self.spans[index] for index in new]
@@ -346,7 +348,7 @@ def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> C
     )
     runs: list[tuple[int, int]] = []
     for first, last in apart:
-        # outliers make brief runs, and cut a run in two
+        # Outliers make brief runs, and divide a run into two.
         whole = time[last] - time[first] >= shortest or first == 0 or last == time.size - 1
         goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
         if whole:

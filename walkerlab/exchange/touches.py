@@ -1,7 +1,7 @@
 """Find the heel strikes in recorded angles.
 
 A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
-neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
+neighbouring crossings of one leg count as one strike. It is timed by the zero of the height in a smooth fit of angles:
 one polynomial before the strike and one after it, which meet at the strike, because only the rates jump. The scatter of
 the angles around the fit gives the standard error of that time.
 """
@@ -21,30 +21,30 @@ from walkerlab.exchange.rate_jumps import WINDOW, WINDOW_AHEAD, Array, squares_a
 Height = Callable[[Array], Array]
 
 DEGREES: Final = range(1, 7)
-"""Degrees of the polynomials; the samples decide between them."""
+"""Degrees of polynomials to try. The samples decide which one is used."""
 ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
-"""These degrees and one more, which shows the bias of the highest."""
+"""`DEGREES` and the next degree, whose fit shows the bias of the highest one."""
 MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
-SHORTEST: Final = 0.25  # fraction of the step period; nearer crossings of one leg are one heel strike
-SLOWEST: Final = 0.25  # fraction of the median speed of falling feet; a slower crossing is no heel strike
+MIN_CROSSING_INTERVAL: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
+MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is no heel strike
 ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
-LOCATED: Final = 1e-3  # correction at which a heel strike is located, in standard errors
-ERRORS: Final = 3.0  # standard errors within which a value is zero
-LASTING_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
+MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
+SIGNIFICANT_ERRORS: Final = 3.0  # a value within this many standard errors of zero counts as zero
+STRIKE_DURATION_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # fewest samples in that time
 JUMP_DEGREE: Final = 4
-# Standard errors by which a jump must be displaced to count. They are many, because many instants are tried.
+# A jump counts if it is displaced by this many standard errors. They are many, because many instants are tried.
 JUMP_ERRORS: Final = 4.5
-MOST_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
+MAX_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
 SIDES: Final = 2
-LOPSIDED: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
-SMALLEST: Final = 1e-30  # rad^2, added to sums of squares, of which logarithms are taken
+MIN_SIDE_RATIO: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
+MIN_SQUARES: Final = 1e-30  # rad^2, added to sums of squares because the logarithm of 0 does not exist
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class StrikeFit:
 
 @dataclass(frozen=True)
 class Touch:
-    """Heel strike: time and its standard error (s), leg that strikes (0 or 1), speed of the foot's fall (m/s)."""
+    """Heel strike: time and standard error (s), leg that strikes (0 or 1), and speed of the falling foot (m/s)."""
 
     time_s: float
     leg: int
@@ -75,7 +75,7 @@ class Touch:
 
 
 Problem = tuple[Array, Array, float, Sequence[int]]
-"""Times (samples,) and angles (samples, 2), the instant at which polynomials meet, and their degrees (rising)."""
+"""Times (samples,), angles (samples, 2), the instant at which the polynomials meet, and their degrees, rising."""
 Fits = dict[int, StrikeFit]  # by degree
 
 
@@ -84,19 +84,19 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
     time    (samples,) s, rising
     angle   (samples, 2) rad, from the vertical, positive with the foot ahead
-    height  function from angles (samples, 2) to the height (samples,) of leg 0's foot over leg 1's (m, normal to slope)
+    height  function from angles (samples, 2) to the height (samples,) of foot 0 over foot 1 (m, normal to the slope)
     """
     crossings = candidates(time, angle, height)
     # The period is not known yet, so at first all consecutive crossings of a leg count as one strike.
     period = typical_interval([crossing for crossing, *_ in merge_repeats(crossings, np.inf)], time)
-    merged = merge_repeats(crossings, SHORTEST * period)
+    merged = merge_repeats(crossings, MIN_CROSSING_INTERVAL * period)
     located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg, _ in merged])
-    # A fit may move a crossing among the first samples to before the recording.
+    # A fit may move a crossing near the first sample to a time before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
     first = touch_at_start(time, angle, height, period)
     if first is not None:
-        touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + SHORTEST * period)]
-    slowest = SLOWEST * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
+        touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + MIN_CROSSING_INTERVAL * period)]
+    slowest = MIN_FALL_SPEED * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
     return [touch for touch in touches if touch.fall_m_s >= slowest]
 
 
@@ -104,8 +104,8 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     """Return the candidate heel strikes, where the front foot comes down to the level of the rear one: the time, the
     leg, and the sum of the foot's heights up to there. Noise can produce several candidates for one strike.
     """
-    # A recording may end with a heel strike, perhaps with two samples at that instant, so it is continued by half the
-    # interval before.
+    # A recording may end at a heel strike, so that the crossing comes just after it. So it is continued by half an
+    # interval.
     before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[before])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
@@ -125,9 +125,9 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
 
 
 def merge_repeats(crossings: Sequence[tuple[float, int, float]], apart_s: float) -> list[tuple[float, int, float]]:
-    """Keep one of consecutive crossings of a leg that are nearer to each other than `apart_s` (s).
+    """Keep only one of the consecutive crossings of a leg that are nearer to each other than `apart_s` (s).
 
-    It is the one with the largest sum of heights, before which the foot was above the other one, and after it below.
+    This is the one with the largest sum of heights: before it the foot was above the other one, after it below.
     """
     strikes: list[list[tuple[float, int, float]]] = []
     for crossing in crossings:
@@ -141,8 +141,8 @@ def merge_repeats(crossings: Sequence[tuple[float, int, float]], apart_s: float)
 def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> Touch | None:
     """Return the heel strike with which a recording begins, or None if it begins at another instant.
 
-    The first sample counts as a heel strike if the height fitted there is zero within three of its standard errors, and
-    if these are short when expressed as a time.
+    The first sample counts as a heel strike if the height fitted there is zero within three standard errors, and if the
+    standard error is short when expressed as a time.
     """
     spread = angle[:, 0] - angle[:, 1]
     begin = float(time[0])
@@ -156,9 +156,9 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     fit = fits.get(degree + 1) or fits.get(degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
-    if touch is None or touch.error_s >= PRECISE_S or off > ERRORS * touch.error_s:
+    if touch is None or touch.error_s >= PRECISE_S or off > SIGNIFICANT_ERRORS * touch.error_s:
         return None
-    # A strike just before the recording looks like one at its first sample, as far off as the fit says.
+    # A strike just before the recording looks like one at the first sample. The error includes the distance in the fit.
     return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
 
 
@@ -176,13 +176,13 @@ def locate_touch(
     degree = DEGREES[0]
     touch = None
     for iteration in range(ITERATIONS):
-        # The best degree shows only once the polynomials meet near the strike.
+        # The degree is chosen again, because the best one shows only once the polynomials meet near the strike.
         choosing = iteration < DEGREE_ITERATIONS
         fits = yield t, y, at, ALL_DEGREES if choosing else (degree, degree + 1)
         degree = best_degree(fits) if choosing else degree
         fit = fits.get(degree)
         if fit is None or len(fit.rates) < SIDES:
-            # one degree more, where the instant is at the end of the samples
+            # Use one degree more if the instant is at the end of the samples, where the bias is largest.
             fit = fits.get(degree + 1) or fit
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch and touch.fall_m_s <= 0.0 and DEGREES[0] in fits:
@@ -192,17 +192,17 @@ def locate_touch(
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
-        if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
+        if iteration >= DEGREE_ITERATIONS and abs(correction) < MAX_CORRECTION * touch.error_s:
             return touch_of(add_bias(touch.fit, fits.get(degree), fits.get(degree + 1)), height, near + at, leg)
         at += correction
-    # Samples that change sides keep moving the zero; it is then as uncertain as it moves.
+    # If samples keep changing sides, the zero keeps moving. Its error is then the size of its moves.
     if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
         return None
     return replace(touch, error_s=float(np.hypot(touch.error_s, correction)))
 
 
 def fit_together(searches: Sequence[Generator[Problem, Fits, Touch | None]]) -> list[Touch | None]:
-    """Run searches in step, making the fits that they wait for together, and return their results."""
+    """Run searches side by side, make the fits that they wait for together, and return the results of the searches."""
     results: list[Touch | None] = [None] * len(searches)
     problems = {index: next(search) for index, search in enumerate(searches)}
     while problems:
@@ -232,31 +232,29 @@ def rows_within(time: Array, instant: float, half: float) -> slice:
 
 def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
     """Return the heel strike of a leg at the time (s) of a fit."""
-    # Close to the best step for central differences in double precision.
+    # This is close to the best step for central differences in double precision.
     small = 1e-6 * np.eye(2)
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
     gradient = (values[:2] - values[2:]) / 2e-6
     slope = float(gradient @ next(iter(fit.rates.values())))
-    error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), LASTING_S) if slope else np.inf
-    # The height is that of leg 0's foot over leg 1's, so it rises as leg 1 comes down.
+    error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), STRIKE_DURATION_S) if slope else np.inf
+    # The height is that of foot 0 over foot 1, so it rises as foot 1 comes down.
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
 
 def best_degree(fits: Fits) -> int:
-    """Return the degree of the polynomials that describe the samples best."""
+    """Return the degree with the best criterion."""
     return min((degree for degree in DEGREES if degree in fits), key=lambda d: fits[d].criterion, default=DEGREES[0])
 
 
 def add_bias(fit: StrikeFit, narrow: StrikeFit | None, wide: StrikeFit | None) -> StrikeFit:
-    """Return a fit whose error includes the change due to one more degree, since the best one balances bias and
-    scatter.
-    """
+    """Return a fit whose error includes its bias: the change from the `narrow` fit to the `wide` one, one degree up."""
     change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 
 
 def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
-    """Fit polynomials of each degree (rising) before and after an instant, which meet there.
+    """For each degree, from low to high, fit one polynomial before and one after an instant, at which they meet.
 
     A side with too few samples for a degree, for example where a recording begins just before a strike, is not fitted,
     because it would force a low degree on the other side. A degree for which both sides have too few samples is absent.
@@ -268,13 +266,13 @@ def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
         counts = {"before": split, "after": t.size - split}
         by_sides: dict[tuple[str, ...], tuple[int, ...]] = {}
         for degree in degrees:
-            fewest = max(degree + 1, LOPSIDED * max(counts.values()))
+            fewest = max(degree + 1, MIN_SIDE_RATIO * max(counts.values()))
             names = tuple(name for name, count in counts.items() if count >= fewest)
             if sum(counts[name] for name in names) > 1 + degree * len(names):
                 by_sides[names] = (*by_sides.get(names, ()), degree)
         for names, of_sides in by_sides.items():
             used = slice(0 if "before" in names else split, t.size if "after" in names else split)
-            # Fits are made together if they have about as many samples.
+            # Problems with similar numbers of samples are fitted together.
             key = names, of_sides, (used.stop - used.start).bit_length()
             alike.setdefault(key, []).append((index, t[used] - at, y[used]))
     for (names, of_sides, _), group in alike.items():
@@ -293,7 +291,7 @@ def fit_sides(
     """
     sizes = np.array([each.size for each in times])
     filled = np.arange(sizes.max()) < sizes[:, None]
-    # Rows of zeros fill up the problems with fewer samples.
+    # Problems with fewer samples are filled up with rows of zeros.
     t = np.zeros(filled.shape)
     y = np.zeros((*filled.shape, 2))
     t[filled] = np.concatenate(times)
@@ -306,8 +304,8 @@ def fit_sides(
     orthonormal, triangle = np.linalg.qr(basis)
     inverse = np.linalg.inv(triangle)
     shares = orthonormal.mT @ y
-    left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + SMALLEST
-    # sums over the columns that a lower degree lacks, and over those that it has
+    left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + MIN_SQUARES
+    # Sums over the columns that a lower degree lacks, and over those that it has.
     missed = np.pad(np.cumsum(np.sum(shares**2, axis=2)[:, ::-1], axis=1)[:, ::-1], ((0, 0), (0, 1)))
     variances = np.cumsum(inverse[:, 0] ** 2, axis=1)
     fits: list[Fits] = [{} for _ in times]
@@ -316,7 +314,7 @@ def fit_sides(
         coefficients = inverse[:, : 1 + len(sides), :columns] @ shares[:, :columns]
         squares = left + missed[:, columns]
         freedoms = 2 * (sizes - columns)
-        # standard deviation of Student's t, because few values determine the scatter only roughly
+        # The standard deviation is that of Student's t, because few values determine the scatter only roughly.
         deviations = np.sqrt(squares / np.maximum(freedoms - 2, 1) * variances[:, columns - 1])
         penalties = 2 * columns * np.log(2 * sizes) * sizes / (sizes - columns)
         criteria = 2 * sizes * np.log(squares) + penalties
@@ -339,7 +337,7 @@ def angles_at_jumps(
     errors  number of standard errors
     """
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), MAX_FIT_TIME * period)
-    inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
+    inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MAX_JUMPS]
     parts = [
         (time[rows] - touch.time_s, angle[rows]) for touch in inside for rows in [rows_within(time, touch.time_s, half)]
     ]
@@ -349,8 +347,8 @@ def angles_at_jumps(
     for t, _ in parts:
         after = np.searchsorted(t, shifts)
         fewer, more = np.sort((after, t.size - after), axis=0)
-        shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, LOPSIDED * more)]
-    # Shifts are judged against the strikes as they were found.
+        shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, MIN_SIDE_RATIO * more)]
+    # Without the unshifted strikes there is nothing to compare shifts with.
     if not parts or not np.any(shifts == 0.0):
         return None
     squares = np.sum(squares_around(parts, np.tile(shifts, (len(parts), 1)), JUMP_DEGREE), axis=0)
@@ -362,10 +360,10 @@ def angles_at_jumps(
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
     variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
-    # A minimum at an end of the range may in truth lie beyond it, so it does not count either.
+    # At an end of the range, the true minimum may lie beyond it, so it does not count either.
     if squares[shifts == 0.0][0] - least <= errors**2 * variance or not 0 < index < shifts.size - 1:
         return None
-    # the smallest residuals between three trials, by a parabola
+    # Find the minimum by a parabola through three trials.
     before, after = squares[[index - 1, index + 1]].tolist()
     best = float(shifts[index] + 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[1] - shifts[0]))
     fits = fits_at(best)

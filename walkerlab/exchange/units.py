@@ -24,15 +24,15 @@ UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "length": LENGTHS,
     "speed": {f"{unit}/{second}": value for unit, value in LENGTHS.items() for second in ("s", "sec", "second")},
     "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
-    # Names are in lower case, so mJ and MJ are alike here. No walker has megajoules.
+    # Names are in lower case, so MJ would read as mJ. No walker has megajoules.
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip
-"""Value of each unit in SI, by kind of quantity; unit names are in lower case and singular."""
+"""Value of each unit in SI, by kind of quantity. The names of units are in lower case and singular."""
 SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 
 
 def value_in_si(unit: str, kind: str) -> float | None:
-    """Return the SI value of a unit, such as mm, Millimeters or [mm], or None if no quantity of this kind has it."""
+    """Return the SI value of a unit, such as mm, Millimeters or [mm], or None if it is not a unit of this `kind`."""
     name = unit.strip().strip("[]()").strip().lower()
     values = UNIT_VALUES[kind]
     # Some units end in s themselves, such as ms, so the s of a plural is removed only if the whole name is unknown.

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
 from walkerlab.exchange.leg_angles import read_leg_angles
-from walkerlab.exchange.marker_lines import NAMED
+from walkerlab.exchange.marker_lines import MAX_NAMED
 from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
 from walkerlab.exchange.smooth_course import FAR_PERCENT, HIGHEST_DEGREE, SAMPLES_PER_DEGREE
-from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
+from walkerlab.exchange.touches import SIGNIFICANT_ERRORS, Height, Touch, angles_at_jumps, find_touches
 from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -34,40 +34,41 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-# An angle is that of a shank if its backward maximum is this many times its value at heel strikes.
+# An angle that reaches backwards this many times as far as at heel strikes is that of a shank.
 SHANK_SWING_RATIO: Final = 1.4
-WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
+MAX_SPREAD_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
-MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
-LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
+MAX_STEP_SAMPLES: Final = 250  # largest number of samples kept within a step
+MAX_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
-"""Shortest and longest plausible step, in s or m; values outside are damaged or in another unit."""
-NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
-SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
-LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
-FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
-ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
-SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
-SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for the tilt begins
+"""Shortest and longest plausible step, in s or m. Other values are damaged or in another unit."""
+MIN_SPREAD_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
+MIN_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
+MAX_SCATTER: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
+MIN_ALTERNATING_STRIKES: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
+MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
+SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
+SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
 """Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
-FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging legs from which a doubt is raised
-NOISE_IN_CLOCK: Final = 7.0  # how much that limit grows with the scatter of the angles, relative to their own
+MAX_CLOCK_RATIO: Final = 1.15  # a clock that differs more from the swinging legs raises a doubt
+NOISE_IN_CLOCK: Final = 7.0  # the limit grows by this multiple of the scatter of the angles, relative to the angles
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-COARSE: Final = 0.2  # largest spacing of recorded values, as a fraction of an error that they can show
-CONSTANT: Final = 0.25  # an error is constant if its scatter over a step is at most this fraction of it
-SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
-SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
+MAX_SPACING: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
+MAX_ERROR_SCATTER: Final = 0.25  # an error counts as constant if it scatters over a step by at most this fraction
+MIN_DISTANCE_M: Final = 1e-30  # m, smallest distance by which a value is divided
+# time from the last sample of a step to the heel strike, as a fraction of the duration of the walk
+STRIKE_MARGIN: Final = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """Recorded walk from its first heel strike on. Column 0 is the leg that swings first."""
+    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 is the leg that swings first."""
 
-    time_s: Array  # (samples,) s, from that heel strike; every later heel strike has a sample on each side
+    time_s: Array  # (samples,) s, from the first heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
@@ -76,7 +77,7 @@ class RecordedSteps:
     length_m: Array  # (steps,)
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
-    origin_s: float  # the recording's time at the first heel strike
+    origin_s: float  # time of the recording at the first heel strike
     doubts: tuple[str, ...]  # oddities of the heel strikes
 
 
@@ -99,7 +100,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
     if model.legs_differ and len(touches) > 1 and touches[1].leg == 1:
-        touches = touches[1:]  # as in computed walks, leg 1 swings first
+        touches = touches[1:]  # leg 1 must swing first, as in computed walks
     if len(touches) < 2:
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
@@ -115,12 +116,12 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    # Energy jumps at heel strikes, so the clock's rate can be seen only if these are certain.
+    # Energy jumps at heel strikes. If their times are uncertain, nothing can be said about the clock.
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
 def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
-    """Return the vectors (samples,) in m from the hip over leg 0's foot centre to that over leg 1's, normal + i along.
+    """Return the vectors (samples,) in m from the hip over the foot centre of leg 0 to that of leg 1, normal + i along.
 
     angles  (samples, 2) of straight legs, from the vertical
     """
@@ -132,7 +133,7 @@ def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
 
 
 def rise_of_soles(model: RigidModel) -> float:
-    """Return the radius of leg 1's foot minus that of leg 0's (m). Leg 0 stands in the exchanged model."""
+    """Return the foot radius of leg 1 minus that of leg 0 (m). Leg 0 stands in the exchanged model."""
     return float(model.radius - model.exchanged.radius)
 
 
@@ -143,7 +144,7 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
     """
     apart = hips_apart(model, angles)
     direction = np.angle(apart)
-    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), SMALLEST), -1.0, 1.0))
+    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), MIN_DISTANCE_M), -1.0, 1.0))
     return np.asarray(2.0 * (direction - np.sign(direction) * level))
 
 
@@ -157,7 +158,8 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # The search begins away from the likely sum, because a small shift is within its error.
+        # The search begins away from the likely sum. The shift from there to the jumps of the rates is larger than its
+        # error. A smaller one would count as no shift, and the rough sum would remain.
         return np.asarray((total(angles) - sum_rad - SEARCH_OFFSET_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -173,7 +175,7 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
     way = walk.belt_m_s * float(steps.touch_time_s[-1])
     if walk.hip_is_in_m:
         ends = steps.origin_s + np.array([0.0, steps.touch_time_s[-1]])
-        # The walker may drift along the belt while it walks.
+        # The walker may drift along the treadmill, which adds to the distance.
         way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
     share = way / float(steps.length_m.sum())
     doubts = steps.doubts
@@ -190,7 +192,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
     Energy is constant within a step of straight legs that nothing drives. If the clock runs fast by a factor r, the
-    measured kinetic energy is too small by r^2. So the ratio of its changes to those of the potential energy gives r.
+    measured kinetic energy is too small by r^2. So the ratio of the changes of kinetic and potential energy gives r.
     The tilt of the recording, which turns gravity, is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
@@ -208,10 +210,10 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     sizes = np.bincount(steps.step)
     means = np.add.reduceat(columns, np.cumsum(sizes) - sizes) / sizes[:, None]
     columns -= means[steps.step]
-    # A tilt turns gravity. The two coefficients are its components, so together they give its size.
+    # The two coefficients are the components of gravity in the tilted axes, so together they give its magnitude.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
-    far = FAR_CLOCK + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
+    far = MAX_CLOCK_RATIO + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
     if 1.0 / far < rate < far:
         return steps
     doubt = (
@@ -224,7 +226,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
 def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
     """Return angles (rad) and rates (rad/s) of both legs (samples, 2), of a polynomial through each step.
 
-    Rates of a spline would contain so much noise that kinetic energies were too large.
+    Rates of a spline contain more noise, which would make kinetic energies too large.
     """
     angles = np.empty_like(steps.angle_rad)
     rates = np.empty_like(steps.angle_rad)
@@ -239,7 +241,7 @@ def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
-    """Return the longest sequence of heel strikes of alternate legs, and a sentence about those left out."""
+    """Return the longest sequence of heel strikes of alternate legs, and sentences about the others."""
     walks: list[list[Touch]] = [[]]
     breaks = []
     for touch in touches:
@@ -251,7 +253,7 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
     if not breaks or len(longest) < 2:
         return longest, []
     kept = f"only the steps from time {longest[0].time_s:.6g} to {longest[-1].time_s:.6g} s are kept"
-    return longest, [f"The same leg strikes twice in a row ({', '.join(breaks[:NAMED])}), so that {kept}."]
+    return longest, [f"The same leg strikes twice in a row ({', '.join(breaks[:MAX_NAMED])}), so that {kept}."]
 
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
@@ -259,7 +261,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
     for leg, name in enumerate(("angle 1", "angle 2")):
         if not (model, model.exchanged)[leg].kneed:
             continue
-        # A percentile, because the minimum may be an outlier.
+        # The minimum itself may be an outlier.
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -271,7 +273,7 @@ def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> 
 def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None:
     """Raise ConfigError if the legs are too far apart at a heel strike and nothing states the unit of their angles."""
     apart, time = max((abs(float(np.diff(touch.fit.angle)[0])), touch.time_s) for touch in touches)
-    if apart > WIDEST_RAD and not walk.unit_is_stated:
+    if apart > MAX_SPREAD_RAD and not walk.unit_is_stated:
         raise ConfigError(
             f"{source}: the legs are {math.degrees(apart):.0f} degrees apart at time {time:.6g} s.",
             "State the unit of angles: --units angle=deg, or --units angle=rad if they are that far apart.",
@@ -280,7 +282,7 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Disagreement between two signs of a heel strike: leg rates that jump, and feet that are level."""
+    """Disagreement between the two signs of a heel strike: jumps of the leg rates, and level feet."""
 
     shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
     sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
@@ -310,11 +312,11 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 def alternates(first: Array, second: Array) -> bool:
     """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
-    if min(first.size, second.size) < FEWEST_ALTERNATING:
+    if min(first.size, second.size) < MIN_ALTERNATING_STRIKES:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
     means = float(np.mean(first)), float(np.mean(second))
-    return abs(means[0] - means[1]) > max(ERRORS * error, ALTERNATING * sum(means))
+    return abs(means[0] - means[1]) > max(SIGNIFICANT_ERRORS * error, MIN_ALTERNATION * sum(means))
 
 
 def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | None:
@@ -327,18 +329,18 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
     if not courses[0] or not courses[1]:
         return None
     swing, stance = (np.mean(courses[0], axis=0)[k] - np.mean(courses[1], axis=0)[k] for k in (0, 1))
-    # Leg 1 stands while leg 0 swings, so the stance legs show the constant with the opposite sign.
+    # The stance leg is the other one, so it shows the constant with the opposite sign.
     differences = np.array([swing, -stance])
     constant = float(np.mean(differences))
-    return constant if float(np.std(differences)) < CONSTANT * abs(constant) else None
+    return constant if float(np.std(differences)) < MAX_ERROR_SCATTER * abs(constant) else None
 
 
 def offset_doubts(
     time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Describe rates that jump before or after the feet are level, and alternating steps, with the error behind them.
+    """Describe jumps of the rates while the feet are not level, and alternating steps, with the error behind them.
 
-    An error of the angles is the explanation if both disappear once it is subtracted.
+    A constant error of the angles explains them if both disappear once it is subtracted.
     """
     before = mismatch(time, angle, touches, model, touch_sum_rad)
     alternate = bool(before.lengths_m) and before.between_rad is not None
@@ -350,7 +352,7 @@ def offset_doubts(
     after = mismatch(time, angle - errors, right, model, touch_sum_rad) if len(right) > 1 else before
     degrees = np.degrees(errors)
     digit = float(np.diff(np.unique(np.round(angle, 9))).min())
-    if after.shift_s or after.lengths_m or after.limps or digit > COARSE * float(np.abs(errors).max()):
+    if after.shift_s or after.lengths_m or after.limps or digit > MAX_SPACING * float(np.abs(errors).max()):
         cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be the cause"
     elif alternate:
         cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
@@ -372,7 +374,7 @@ def refuse_noise(angle: Array, source: str) -> None:
     """Raise ConfigError if scatter hides the heel strikes."""
     noise = noise_of(angle)
     apart = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
-    if noise > LOUDEST * apart:
+    if noise > MAX_SCATTER * apart:
         raise ConfigError(
             f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, and the legs are {apart:.2g} rad "
             "apart: heel strikes found there would be noise.",
@@ -383,7 +385,7 @@ def refuse_noise(angle: Array, source: str) -> None:
 def unit_doubts(touches: list[Touch]) -> Iterator[str]:
     """Yield a doubt about the unit of the angles if the legs are very close to each other at heel strikes."""
     apart = float(np.median([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in touches]))
-    if apart < NARROWEST_RAD:
+    if apart < MIN_SPREAD_RAD:
         yield (
             f"The legs are only {math.degrees(apart):.2g} degrees apart at heel strikes. The file may state "
             "the wrong unit of angles."
@@ -394,9 +396,9 @@ def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
-    # With a spring at the hip, a leg swings faster than it would hang, so there is no limit.
+    # With a spring at the hip, a leg may swing much faster than a hanging pendulum, so there is no limit.
     swing_s = math.pi * math.sqrt(model.A[SWING, SWING] / weight) if weight and not model.sprung else 0.0
-    if step_s < SHORTEST_STEP * swing_s:
+    if step_s < MIN_STEP * swing_s:
         raise ConfigError(
             f"{source}: steps of {step_s:.3g} s are not credible, because a leg of this walker swings forwards in "
             f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is wrong.",
@@ -426,12 +428,11 @@ def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
     """Raise ConfigError for a step whose samples are too far apart to determine its heel strikes and velocities."""
     for number, (begin, end) in enumerate(pairwise(touches), 1):
         first, last = longest_gap(walk.time_s, begin, end)
-        if last - first > LONGEST_GAP * (end - begin):
+        if last - first > MAX_GAP * (end - begin):
             raise ConfigError(
                 f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
                 f"{(last - first) / (end - begin):.0%} of its duration.{f' {walk.gaps}.' if walk.gaps else ''}",
-                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or read a part without gaps (--from-s, "
-                "--to-s).",
+                f"Record at least {1 / MAX_GAP:.0f} samples per step, or read a part without gaps (--from-s, --to-s).",
             )
 
 
@@ -452,13 +453,13 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     velocity = walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin
-    # A step ends just before its heel strike, because a sample at the strike begins the next step.
-    side = SIDE * float(times[-1])
+    # The sample at a strike begins the next step, so the last sample of a step lies just before it.
+    side = STRIKE_MARGIN * float(times[-1])
     spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
-    # A spline is least certain at its ends, where the fits of the heel strikes are better.
+    # At the ends of a step, the fits of the heel strikes are more accurate than the spline.
     for number, (_, angles, velocities) in enumerate(pieces):
         for row, touch, rates in end_fits(touches, number):
             angles[row] = touch.fit.angle[order]
@@ -466,7 +467,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
                 velocities[row] = rates[order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    lengths = lengths_of(model.exchanged if swapped else model, angles_rad, step, len(times))
+    lengths = lengths_from_angles(model.exchanged if swapped else model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
     errors = np.array([touch.error_s for touch in touches])
     return RecordedSteps(
@@ -475,7 +476,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for each end of a step, the row of its sample, the heel strike, and the rates within the step."""
+    """Return the row of the sample, the heel strike, and the rates within the step, for both ends of a step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
@@ -487,7 +488,7 @@ def is_recorded_beyond(time: Array, touches: Array) -> bool:
     if np.count_nonzero(time >= touches[-1]) <= SPLINE_DEGREE:
         return False
     first, last = longest_gap(time, float(touches[-1]), float(time[-1]))
-    return last - first <= LONGEST_GAP * float(np.diff(touches, prepend=0.0)[-1])
+    return last - first <= MAX_GAP * float(np.diff(touches, prepend=0.0)[-1])
 
 
 def samples_within(time: Array, columns: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -498,18 +499,18 @@ def samples_within(time: Array, columns: Array, begin: float, end: float) -> tup
     first, after = np.searchsorted(time, begin), np.searchsorted(time, end, "right")
     spline = spline_through(time[first:after], columns[first:after])
     inside = np.arange(np.searchsorted(time, begin, "right"), np.searchsorted(time, end))
-    inside = inside[:: max(1, math.ceil(inside.size / MOST_SAMPLES))]
+    inside = inside[:: max(1, math.ceil(inside.size / MAX_STEP_SAMPLES))]
     grid = np.concatenate(([begin], time[inside], [end]))
     values = spline(grid)
-    # Recorded values stay as they are. The spline serves only for the ends and for velocities.
+    # The spline is used only for the ends and for velocities. All other values stay as recorded.
     values[1:-1] = columns[inside]
     velocities = spline.derivative()(grid)[:, :2] if columns.shape[1] == 2 else values[:, 2:]
     return grid, values[:, :2], velocities
 
 
 def spline_through(time: Array, columns: Array) -> BSpline:
-    """Fit a spline with evenly spaced knots, with fewer knots if there are few samples."""
-    # Imported here, because checking whether a result is up to date needs no fit.
+    """Fit a spline with evenly spaced knots, and with fewer of them if there are few samples."""
+    # Imported here, because it is not needed to check whether a result is up to date.
     from scipy.interpolate import make_lsq_spline
 
     degree = min(SPLINE_DEGREE, time.size - 1)
@@ -519,10 +520,10 @@ def spline_through(time: Array, columns: Array) -> BSpline:
     return make_lsq_spline(time, columns, knots, degree)
 
 
-def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
+def lengths_from_angles(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
     """Return the step lengths (m) from the leg angles at the beginning and end of each step.
 
-    model  the one of the first step
+    model  rigid model whose swing leg is that of the first step
     """
     n = len(model.arm_x)
     states = np.zeros((2, count, 2 * n))

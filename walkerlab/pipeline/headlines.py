@@ -53,7 +53,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "plot": (),
     "report": (),
 }  # fmt: skip
-"""Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
+"""Headline quantities of each stage. A name that ends in a dot covers all quantities below it."""
 MAX_HEADLINES: Final = 13
 WALK_QUANTITIES: Final = (
     "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "step_length_m", "numerical_error.",
@@ -76,7 +76,7 @@ LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
     "last_step_period_s": "step_periods_s",
     "last_step_length_m": "step_lengths_m",
 }
-"""Headlines that are the last entry of a list, each with the name of its list."""
+"""Headlines that are the last entry of a list: names of the lists by headline."""
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:

@@ -41,8 +41,8 @@ class Reporter(Protocol):
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
         """Begin a stage, possibly while others run.
 
-        place       its number among the stages to run and the reason for a rerun; '' for a single new stage
-        expected_s  its last run time (s), if known
+        place       number of the stage among those to run, and the reason for a rerun; '' for a single new stage
+        expected_s  last run time of the stage (s), if known
         """
 
     def announce_page(self, summary: Mapping[str, Any], folder: Path) -> None:

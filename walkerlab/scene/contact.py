@@ -1,6 +1,4 @@
-"""Build the contact model of a config, with only the parts that the config needs, the laws of its ground, and starts
-with scaled velocities, for maps and basins.
-"""
+"""Build the contact model of a config with only the parts that the config needs, and starts with scaled velocities."""
 
 from __future__ import annotations
 
@@ -43,7 +41,7 @@ if TYPE_CHECKING:
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-# The derivatives of a radau5 step are exact.
+# radau5, because the derivatives of its steps are exact.
 GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
@@ -78,7 +76,7 @@ def contact_scene(
 
     rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
-    asymmetry            second minus first step length, divided by their mean; it shifts the lanes of pads
+    asymmetry            second minus first step length, divided by their mean; the lanes of pads are shifted by it
     """
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
@@ -106,11 +104,11 @@ def scene_on_pads(
     search: GaitAnswer | None = None,
     asymmetry: float = 0.0,
 ) -> ContactScene:
-    """Build the scene of a config with its pads.
+    """Build the scene of a config, pads included.
 
     search  result of an earlier search for the contact gait; None to search if necessary
 
-    Raises NoAnswer if their pitch needs a contact gait and none is found.
+    Raises NoAnswer if the pitch of the pads needs a contact gait and none is found.
     """
     pitch = None
     if wants_own_pitch(require_contact(config)):
@@ -138,14 +136,14 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
-    # A knee that is free in the rigid strike must not be rigid while the leading foot sinks in.
+    # A knee that is free in the rigid model's strike must not stay locked while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
     return KneeRules(Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
-# Terrains by pitch and asymmetry of the steps. Leg 1 starts as far behind leg 2 as the second step is long.
+# Functions that lay out a terrain, given pitch and asymmetry of the steps. Leg 1 starts a second step behind leg 2.
 TERRAINS: dict[str, Callable[[float, float], Terrain]] = {
     "checkerboard": lambda pitch, asymmetry: checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
     "after-mid-swing": lambda pitch, _: after_mid_swing(pitch),
@@ -164,7 +162,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
     rigid_step_length_m  initial pad pitch
     """
-    # A gait has no pinned step, and the search replaces this pitch by the gait's step length.
+    # The pitch is only a start: the search replaces it by the step length of the gait.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)
@@ -172,7 +170,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait, replacing pads by a plane that lets scuffing feet through."""
+    """Find the gait of the contact model on a plane without pads that lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
@@ -206,14 +204,14 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
 def start_state(scene: ContactScene, rigid_state: State) -> State:
     """Convert a rigid start to a state of the contact model. The stance foot just touches the ground at along = 0.
 
-    rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
-                 dtheta_1, dtheta_2)
+    rigid_state  state of the rigid model with both feet on the slope. For a compass it is (theta_1, theta_2, dtheta_1,
+                 dtheta_2) with index 1 for the swing leg, 2 for the stance leg
 
     Position and velocity are first computed with a hinge at the ball foot's centre. Unless the foot is pinned, its
     velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
-    # The bodies of a straight leg turn as one in the rigid model; here each has its own angle.
+    # In the rigid model the bodies of a straight leg turn as one. Here each of them has an angle.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -227,7 +225,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
-    # By definition, the static penetration is that under the whole weight, not under its part normal to the slope.
+    # The static penetration is defined under the whole weight, not under its component normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 
@@ -241,7 +239,7 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
     }
 
 
-# Except at boundaries between outcomes, these tolerances give the same map as the config's.
+# Tolerances of maps. They give the same map as the config's, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
 MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
@@ -261,7 +259,7 @@ def build_scaled_starts(
 
 
 def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
-    """Return period (s) and length (m) of each step of a gait, which is a single step for equal legs."""
+    """Return period (s) and length (m) of each step of a gait: one step for equal legs, otherwise two."""
     if len(gait.steps) == 1:
         return ((gait.period_s, gait.step.length_m),)
     return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))
@@ -270,6 +268,6 @@ def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the starts with the solver settings of a map.
 
-    evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
+    evaluations  right-hand-side evaluations for the unchanged start. The budget of a cell is a multiple of them
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

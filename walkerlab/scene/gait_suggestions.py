@@ -1,4 +1,4 @@
-"""Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
+"""Suggest changes that give a walker a gait: feet ahead of the shanks, or another slope.
 
 For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
 on a few slopes and follows their branches over the slope.
@@ -23,9 +23,9 @@ from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
-# rad; most walkers that have gaits have them on these slopes
+# rad. Most walkers that have gaits have them on these slopes.
 COMMON_SLOPES = (0.03, 0.12)
-# rad; the steepest slope to which gaits are followed lies between these
+# rad. Gaits are followed at least to the first slope, and at most to the second.
 MIN_FOLLOWED_TO = 0.2
 MAX_FOLLOWED_TO = 0.35
 SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
@@ -37,7 +37,7 @@ FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the sha
 
 @dataclass(frozen=True)
 class SlopeRange:
-    """Range of slopes (rad) with gaits, and the part of it with stable gaits, or None if no gait is stable."""
+    """Range of slopes (rad) with gaits, and the part with stable gaits, which is None if no gait is stable."""
 
     slopes: tuple[float, float]
     stable: tuple[float, float] | None

@@ -74,7 +74,7 @@ class Fixed(NamedTuple):
 
     @property
     def measured(self) -> bool:
-        """Whether somebody measured or set the value, so that it may be wrong."""
+        """Whether the value was measured or set by a user, and so may be wrong."""
         return self.value != 0.0 and self.name not in KNOWN
 
 
@@ -82,25 +82,25 @@ LEGS: Final = (1, 2)
 Begin = Callable[[str, int], Callable[[], None]]
 KEPT_CONFIGS: Final = 512  # numbers of changed configs and of their walkers that are cached
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
-AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
+AT_BOUND: Final = 1e-6  # a parameter this near to a bound, relative to its scale, counts as at the bound
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
-# Walk errors are near 1e-10, far below noise.
+# Errors of walks at these tolerances are near 1e-10, far below noise.
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
-LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
+LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over which walks count as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
-PROMISING_GAIN: Final = 2.0  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
-RARE_GAIN: Final = 0.01  # a gain is surprising if it is more improbable than this under the right model
-REFITS: Final = 3  # refits with a freed parameter, each of which must raise the log-likelihood
+RARE_GAIN: Final = 0.01  # a gain is not due to chance if it is less probable than this under the right model
+REFITS: Final = 3  # maximum number of refits with a freed parameter; each must raise the log-likelihood
 REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
 UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
-"""Parameters whose value is beyond doubt."""
+"""Parameters whose values are not doubted."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -119,7 +119,7 @@ class ConfigFamily:
         return self.rigid_walker(values) is not None
 
     def vary(self, make: Callable[[ContactConfig], R]) -> Callable[[Any], R | None]:
-        """Return a function from values to `make(config)`, or to None if the schema rejects them or `make` does."""
+        """Return a function from values to `make(config)`, or to None if the schema or `make` rejects them."""
 
         def make_at_values(values: Values) -> R | None:
             config = self.at(values)
@@ -155,7 +155,7 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None =
 
 
 def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
-    """Return the number of steps from the subject's state to the start of its `step_map_of`."""
+    """Return the number of steps from the state of the subject to the start of `step_map_of`."""
     return ((leg or subject.first_leg) - subject.first_leg) % family.stride
 
 
@@ -176,8 +176,8 @@ def identify_walk(
     """Fit parameters to a measured walk with each model, and return the likeliest result, preferring models that fit.
 
     gait   summary of `fixedpoint` for the config
-    note   receives messages
-    begin  receives the name of each fit and its maximum number of rounds, returns a function to call at each round
+    note   called with each message
+    begin  called with the name and the maximum number of rounds of each fit; returns a function to call at each round
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
@@ -196,7 +196,7 @@ def identify_walk(
 
 
 def rank(answer: Identification) -> tuple[bool, float]:
-    """Return a key that sorts results: those that fit, then by their likelihood."""
+    """Return a sort key: results that fit are better than others, then those of higher likelihood."""
     verdict = answer.models[0]
     return verdict.usable, verdict.log_likelihood or -math.inf
 
@@ -238,7 +238,7 @@ def identify_with(
 def identify_beginning(
     subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
-    """Fit a model to a walk whose first step is that of `measured.first_leg`. Returns as `identify_with`."""
+    """Fit a model to a walk whose first step is that of `measured.first_leg`. The result is as in `identify_with`."""
     model = subject.model
     problem = problem_of(subject, measured, question)
     # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
@@ -259,9 +259,7 @@ def identify_beginning(
 
 
 def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
-    """Refit angles at their sample times, from the fit at equal phase, or return None for measured steps or a failed
-    fit.
-    """
+    """Fit angles at their sample times, starting from the fit at equal phase. Return None for steps or a failed fit."""
     forecast = first.forecast
     u = first.u
     if not forecast.measured.sampled:
@@ -307,7 +305,7 @@ def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
 def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: Fitted) -> Identification:
     """Build the result of an identification from its fits.
 
-    steps  fit that predicts the step periods; differs from `best` only if angles were fitted at their sample times
+    steps  fit that predicts the step periods. It differs from `best` only if angles were fitted at their sample times
     """
     problem = best.problem
     forecast = best.forecast
@@ -331,7 +329,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(best, keys, question.prior))
     second_leg = mass_of_second_leg(subject.config) if forecast.walks.stride == 1 and alternates(steps) else None
     fixed = [*fixed_parameters(subject, question, best, fixed_keys(subject, question))]
-    # Leg 2 follows leg 1 while the parameters of both legs change, so that one of its own is changed alone.
+    # A separate call, because leg 2 follows changes of leg 1 only while no parameter of leg 2 is varied with them.
     other_leg = [*fixed_parameters(subject, question, best, [second_leg])][:1] if second_leg else []
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
@@ -387,7 +385,7 @@ def leg_differences(
 
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
-    """Yield how far the data would move each estimate that is at a bound, in standard errors of the free estimate."""
+    """Yield, for each estimate at a bound, how far the data would move it, in standard errors of the free estimate."""
     problem = fitted.problem
     scales = fitted.forecast.scales
     errors = independent_errors(fitted)
@@ -430,11 +428,11 @@ def describe_pull(pull: Pull) -> str:
 def suggest_parameter(
     subject: ModelUnderTest, keys: Sequence[str], others: Sequence[Fixed], fitted: Fitted
 ) -> Iterator[str]:
-    """Yield a fixed parameter or nuisance that would explain the walk better if it were estimated as well, or as well
-    if it alone differed from the config.
+    """Yield advice on a fixed parameter or nuisance that would explain the walk better if it were estimated, too, or
+    that would alone explain it as well as the estimates do.
 
-    A parameter that somebody measured is doubted once it explains the walk better. Any other one, such as gravity or a
-    spring that the walker is not said to have, must gain more than chance allows for as many values.
+    A parameter that was measured is doubted as soon as it explains the walk better. For any other one, such as gravity
+    or a spring that the config does not have, the gain must be too large to be due to chance.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
@@ -470,13 +468,13 @@ def describe_change(other: Fixed, change: float) -> str:
 
 
 def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
-    """Return by how much the log-likelihood would fall, to second order, if all estimates but the one that helps most
-    had the config's values.
+    """Return the loss of log-likelihood, to second order, if all estimates but the most helpful one had the config's
+    values.
     """
     count = len(keys)
     moved = fitted.u[:count] - np.array(fitted.problem.start) / fitted.forecast.scales
     information = marginalise(fitted.evaluation.information, count)
-    # in turn, the last parameter is free
+    # In each order, the last parameter is the free one.
     orders = [np.roll(np.arange(count), shift) for shift in range(count)]
     rests = [(moved[order[:-1]], marginalise(information[np.ix_(order, order)], count - 1)) for order in orders]
     return min(float(0.5 * moves @ known @ moves) for moves, known in rests)
@@ -485,8 +483,10 @@ def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
 def changes_alone(
     subject: ModelUnderTest, keys: Sequence[str], others: Iterable[Fixed], fitted: Fitted
 ) -> Iterator[tuple[Any, Fixed, float]]:
-    """Yield the log-likelihood, the fixed parameter and its change, in its scale, wherever this change alone explains
-    a walk that contradicts the config, while at least two estimated parameters keep the config's values.
+    """Yield fixed parameters of which a change alone explains a walk that contradicts the config.
+
+    Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters, at
+    least two, keep the config's values.
     """
     if (
         len(keys) < 2
@@ -495,7 +495,7 @@ def changes_alone(
         or distance_from_config(keys, fitted) < FAR_FROM_CONFIG
     ):
         return
-    # A likelihood-ratio test must not reject the change alone in favour of the estimates, which are more parameters.
+    # A likelihood-ratio test must not reject this single change in favour of the estimates, which are more parameters.
     enough = fitted.evaluation.likelihood - 0.5 * chdtri(len(keys) - 1, REJECTED)
     for other in others:
         problem = problem_for(subject, (other.name,), [UNBOUNDED], fitted.problem)
@@ -507,8 +507,8 @@ def changes_alone(
 def gain_of_freeing(
     subject: ModelUnderTest, keys: Sequence[str], other: Fixed, rows: Reduced, fitted: Fitted
 ) -> tuple[float, float]:
-    """Return how much the log-likelihood rises if one more parameter is estimated, and the change of this parameter, in
-    its scale.
+    """Return the gain of log-likelihood if one more parameter is estimated, and the change of this parameter in its
+    scale.
 
     Both are those of a linearised step with new standard deviations or, if the step is long, of a new fit.
 
@@ -526,7 +526,7 @@ def gain_of_freeing(
     wider = problem_for(subject, (*keys, other.name), [*problem.bounds, UNBOUNDED], problem)
     like = fitted
     u = start
-    # The standard deviations may change back and forth between refits, and a gain that does not stay is none.
+    # Standard deviations may change back and forth between refits. A gain that a refit loses does not count.
     for _ in range(REFITS):
         refitted = refit(wider, u, like)
         if refitted is None or refitted.evaluation.likelihood - fitted.evaluation.likelihood <= DECISIVE_GAIN:
@@ -539,7 +539,7 @@ def gain_of_freeing(
 def problem_for(
     subject: ModelUnderTest, keys: Sequence[str], bounds: Sequence[Sequence[float]], problem: FitProblem
 ) -> FitProblem:
-    """Return a problem that fits other keys to the same walk."""
+    """Return a problem that fits the parameters `keys` to the same walk as `problem`."""
     family = ConfigFamily(subject.config, keys)
     walks = step_map_of(subject, family, problem.forecast.measured.first_leg)
     forecast = replace(problem.forecast, walks=walks, admits=family.admits, scales=family.scales())
@@ -567,7 +567,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. A length or inertia of zero changes by 1 % of that of a leg, a drive not at all."""
+    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg. Other zeros stay."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -608,7 +608,7 @@ def fixed_parameters(
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
-        # Only the exact differences may be one-sided, where a walk on one side ends early.
+        # If a walk on one side ends early, only the exact differences can be one-sided.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:
@@ -712,7 +712,7 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
     slopes = np.zeros((forecast.scales.size, centre.size))
     names = GAIT_NAMES[: centre.size]
     for index, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
-        # The derivatives of measured steps use the same differences, so these walkers are already cached.
+        # The fit has used the same differences, so these walkers are already cached.
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}

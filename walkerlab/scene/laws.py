@@ -4,7 +4,7 @@ from typing import Any
 
 from walkerlab.config.contact import Contact
 from walkerlab.errors import ConfigError
-from walkerlab.extensions import declared, load
+from walkerlab.extensions import code_by_word, load
 from walkerlab.physics.kernels import LawKind
 from walkerlab.physics.mechanics.hinges import HINGE_LAWS
 from walkerlab.scene.parts import AnyWalker
@@ -20,7 +20,7 @@ def law_class(kind: LawKind, word: str) -> Any:
     Raises ConfigError if a law that an extension added is incomplete.
     """
     try:
-        law = kind.laws.get(word) or load(declared(kind.key)[word])
+        law = kind.laws.get(word) or load(code_by_word(kind.key)[word])
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"{error}.", where_to_look(kind)) from error
     if missing := missing_members(law, kind):
@@ -43,10 +43,10 @@ def where_to_look(kind: LawKind) -> str:
 
 
 def missing_members(law: type, kind: LawKind) -> list[str]:
-    """List what a law's class lacks: members of its protocol, and registered cases of functions."""
+    """List what the class of a law lacks: members of the protocol, and registered cases of functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
-    # A law with one of these functions needs the others: events that are counted must also be sampled.
+    # A law with one of these functions needs the others, too. For example, counted events must also be sampled.
     together = kind.together if any(law in function for function in kind.together) else ()
     cases = [function for function in (*kind.required, *together) if law not in function]
     return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]

@@ -29,7 +29,7 @@ class LeftOut:
 
 # `LeftOut` as stored in summaries.
 Entry = dict[str, str]
-# Values per sample of each output.
+# Number of values per sample, by output.
 RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 

@@ -50,7 +50,7 @@ class Parameter:
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
-            # The schema's limits are in radians.
+            # The message of the schema would state the limits in radians.
             if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
@@ -84,7 +84,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
-            # A second leg like the first has no block of its own yet.
+            # The block is missing if the second leg is like the first.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
@@ -101,7 +101,7 @@ def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
 
 
 def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the path of leg 1's key for that of a key of leg 2, or the path itself for other keys."""
+    """Return the path of the same key of leg 1 for a key of leg 2, or the path itself for other keys."""
     return tuple(name for name in path if name != SECOND_LEG)
 
 
@@ -117,7 +117,7 @@ def _keys_set(value: Any) -> Any:
     if not isinstance(value, fields.Block):
         return value
     keys = value.model_dump(exclude_unset=True)
-    # The type is needed even where it is a default, because it decides which keys a block has.
+    # The type is stated even if it is the default, because it decides which keys a block has.
     return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
@@ -156,7 +156,7 @@ def explain_non_parameter(
     key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
-    # `own` has the keys that exist for this config's type of walker
+    # `own` has the keys that exist for the type of walker of this config.
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"

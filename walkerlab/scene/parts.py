@@ -1,8 +1,8 @@
 """Build the parts of a config's walker, shared by both models: assemblies, from the dimensions of each type of walker.
 
-A body's frame has its origin at a hinge (the knee for a shank, otherwise the hip) and its y axis points up the body;
-"ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
-a leg's foot forward, so in a flexed knee the shank's angle is smaller than the thigh's.
+The frame of a body has its origin at a hinge (the knee for a shank, otherwise the hip). The y axis points up the body.
+"Ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
+the foot forward, so in a flexed knee the angle of the shank is smaller than that of the thigh.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ UPPER_END = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Limb:
-    """Rigid limb hanging from its upper end, SI."""
+    """Rigid limb, described from its upper end, SI."""
 
     length_m: float
     mass_kg: float
@@ -62,7 +62,7 @@ def replace_second_leg(walker: Assembly, other: Assembly) -> Assembly:
     sources = (walker, legs[0]), (other, legs[1])
     names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])
     bodies = {body.name: body for source, leg in sources for body in source.bodies if body.name in leg}
-    # The hip joins bodies of both legs, so the hinges within one leg are knees.
+    # Hinges within one leg are knees. The hip joins bodies of both legs.
     knees = tuple(j for source, leg in sources for j in source.joints if {j.parent, j.child} <= {*leg})
     return Assembly(
         bodies=tuple(bodies[name] for name in names),
@@ -175,7 +175,7 @@ class Drives(NamedTuple):
 
 def drive_parameters(config: RigidConfig) -> Drives:
     dampings = knee_dampings(config.walker)
-    # a knee is only damped
+    # Knees have no spring and no torque.
     knees = tuple((0.0, damping, 0.0) for damping in dampings) if any(dampings) else ()
     return Drives(config.walker.hip.parameters, push_offs(config.push_off), knees)
 

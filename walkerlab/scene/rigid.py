@@ -39,7 +39,7 @@ def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
 
 
 FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-CACHED_LEVEL_WALKERS = 16  # families over slopes reuse their walkers on level ground
+CACHED_LEVEL_WALKERS = 16  # walkers on level ground that are kept, for families over slopes
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": drives.knees[leg]} if drives.knees else {})
         for leg, push in enumerate(drives.push_offs)
     ]
-    # Equal drives leave equal legs a single model.
+    # With equal drives, both legs share one model.
     if legs[0] == legs[1]:
         return driven.changed(**legs[0])
     return pair(*(replace_fields(model, leg) for model, leg in zip((driven, driven.exchanged), legs, strict=True)))

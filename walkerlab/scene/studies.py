@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.extensions import declared, extensions, load
+from walkerlab.extensions import code_by_word, extensions, load
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations
@@ -25,7 +25,7 @@ def is_studied(config: Any) -> bool:
 
 
 def replace_equations(model: RigidModel, equations: Equations) -> RigidModel:
-    moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else load(declared("equations")[equations])(model)
+    moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else load(code_by_word("equations")[equations])(model)
     return moved
 
 

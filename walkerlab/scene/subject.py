@@ -1,6 +1,4 @@
-"""A model with its gait, ready to be disturbed or differentiated, and its step maps as functions of a parameter, for
-following families of gaits.
-"""
+"""Models with their gaits, ready to be disturbed or differentiated, and step maps over a parameter for families."""
 
 from __future__ import annotations
 
@@ -62,7 +60,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
-    # Any step length will do to see whether two scenes differ.
+    # The step length does not matter, because the scenes are only compared.
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
     first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
@@ -100,7 +98,7 @@ def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError
     )
 
 
-# Solver settings for walks of which only the number of steps matters; the budget is per step.
+# Solver settings, with a budget per step, for walks of which only the number of steps matters.
 QUICK_WALKS: Final = {
     RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
     CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
@@ -138,7 +136,7 @@ class ModelUnderTest:
     @property
     def first_leg(self) -> int:
         """Leg (1 or 2) that swings in the first complete step from the gait's section."""
-        # On the contact model's section leg 1 has begun its swing, so the first complete step is that of leg 2.
+        # The section of the contact model lies within the swing of leg 1, so the first complete step is that of leg 2.
         return 1 if self.model == RIGID else 2
 
     @property
@@ -163,7 +161,7 @@ def find_model_gait(
     """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
-    note  receives a message about each difference from the scene of the config
+    note  called with a message about each difference from the scene of the config
 
     Raises NoAnswer if it has no gait.
     """
@@ -174,7 +172,7 @@ def find_model_gait(
     # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
-    # The scene's config may hold only the keys that a stage reads; the search copies a complete one.
+    # `config` may have only the keys that a stage reads, but the search needs a complete config to copy.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

@@ -8,7 +8,7 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import Kneed
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 
-# Explanations of outcomes that the contact model's ground causes; pads are treated separately.
+# Explanations of outcomes that the ground of the contact model causes, except for pads.
 GROUND_CAUSES: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",

@@ -12,7 +12,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
-from walkerlab.pipeline.stages.walk import LEAST_RTOL, change, tightened
+from walkerlab.pipeline.stages.walk import MIN_RTOL, change, tightened
 from walkerlab.pipeline.store.content import Content
 
 # corrected equations, 0.0174 rad (fixed point of the paper's walker)
@@ -58,14 +58,14 @@ def test_error_estimate_of_a_hip_torque_cost_agrees_with_a_far_tighter_walk():
 
 
 def test_second_walk_falls_back_to_a_smaller_factor_or_another_method():
-    assert [bound.ge for bound in SolverSettings.model_fields["rtol"].metadata if isinstance(bound, Ge)] == [LEAST_RTOL]
+    assert [bound.ge for bound in SolverSettings.model_fields["rtol"].metadata if isinstance(bound, Ge)] == [MIN_RTOL]
     usual, by = tightened(Tolerances("dop853", 1e-12, 1e-12, 1))
     assert (usual.rtol, usual.atol, by) == (pytest.approx(1e-14), 1e-14, "a hundred times tighter tolerances")
     some, by = tightened(Tolerances("dop853", 1e-13, 1e-12, 1))
     assert (some.rtol, some.atol, by) == (pytest.approx(1e-14), 1e-13, "ten times tighter tolerances")
     other, by = tightened(Tolerances("dop853", 2e-14, 1e-12, 1))
     assert (other.method, other.rtol, by) == ("radau5", 2e-14, "another method, radau5")
-    assert tightened(Tolerances("radau5", LEAST_RTOL, 1e-12, 1))[0].method == "dop853"
+    assert tightened(Tolerances("radau5", MIN_RTOL, 1e-12, 1))[0].method == "dop853"
 
 
 def test_unusual_second_walk_is_reported():

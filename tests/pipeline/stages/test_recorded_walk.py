@@ -18,7 +18,7 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.paper.sections import describe_recorded, recorded_tables
-from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
+from walkerlab.exchange.walk_in_steps import MAX_STEP_SAMPLES
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.progress import Silent
@@ -234,7 +234,7 @@ def test_dense_recording_is_thinned(tmp_path):
         *(",".join(map(str, row)) for row in zip(time, *angle, strict=True)),
     ]
     read = walkerlab.read_walk(written(tmp_path, "\n".join(rows)))
-    assert np.bincount(read.content["trajectory"]["step"]).max() <= MOST_SAMPLES + 2
+    assert np.bincount(read.content["trajectory"]["step"]).max() <= MAX_STEP_SAMPLES + 2
 
 
 def marker_recording(folder):

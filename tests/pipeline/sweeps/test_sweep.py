@@ -26,7 +26,7 @@ from walkerlab.pipeline.store.runs import CHUNKS, RunFolder
 from walkerlab.pipeline.sweeps import sweep as sweeps
 from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, flatten_summary, omit_outputs
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
-from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_of_each
+from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_numbers
 from walkerlab.views.report.sweep_page import summary_lines
 
 xr = import_late("xarray")
@@ -295,7 +295,7 @@ def test_table_shows_headline_values_unless_all_are_requested(toy):
 
 
 def test_last_step_is_taken_from_each_walk():
-    last = last_of_each(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
+    last = last_numbers(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
     assert last[:2].tolist() == [0.8, 0.6]
     assert np.isnan(last[2])
 

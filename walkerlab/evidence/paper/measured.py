@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.contact import BOUNDS_SI, Contact
-from walkerlab.config.drives import acting_on
+from walkerlab.config.drives import drives_and_springs_of
 from walkerlab.config.fields import are_equal
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config, Equations
@@ -207,7 +207,7 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
     paper = CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []
-    if acting := acting_on(config):
+    if acting := drives_and_springs_of(config):
         rigid.append(f"the walker has {' and '.join(acting)}")
     if not config.ground.even:
         rigid.append("the ground is uneven")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Graph:
     """Stages of a pipeline, each after the stages that it needs.
 
-    at  import path, module:NAME, by which other processes find it; sweeps need it
+    at  import path of the graph, module:NAME, by which other processes find it; needed for sweeps
     """
 
     def __init__(self, *stages: Stage, at: str = "") -> None:
@@ -72,14 +72,14 @@ class Graph:
 by_name: dict[str, Stage] = {}
 for extension in extensions().values():
     for stage in extension.stages:
-        by_name.setdefault(stage.name, stage)  # commands refuse equal names, with advice
+        by_name.setdefault(stage.name, stage)  # equal names are reported by `check_names`
 STAGES = tuple(by_name.values())
 
 
 def complete(drawing: Stage) -> Stage:
-    """Add to a drawing's inputs the stages that say that the drawing needs or shows their results.
+    """Add to the inputs of a drawing the stages that name the drawing in `needed_by` or `shown_by`.
 
-    A stage whose block has its own name is needed only by configs with that block.
+    A stage with the same name as a config block is needed only by configs with that block.
     """
     needed = tuple(stage for stage in STAGES if drawing.name in stage.needed_by)
     shown_names = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
@@ -95,7 +95,7 @@ def complete(drawing: Stage) -> Stage:
 
 PIPELINE = Graph(
     *(stage for stage in STAGES if not stage.draws),
-    # the report shows what all others have drawn
+    # The report comes last, because it shows what all others have drawn.
     *(complete(stage) for stage in STAGES if stage.draws and stage.name not in DRAWINGS),
     *(complete(stage) for stage in STAGES if stage.name in DRAWINGS),
     at="walkerlab.pipeline.plan.graph:PIPELINE",

@@ -19,10 +19,10 @@ from walkerlab.scene.omissions import LeftOut
 
 
 class Planner:
-    """Decides what to do with some stages under one config, knowing the results that exist so far.
+    """Decides for each of some stages, under one config, whether to reuse, run or leave it out.
 
     stages    stages to bring up to date, each after the stages that it needs
-    force     run every stage that is not left out, even if its result is current
+    force     whether to run every stage that is not left out, even if the result is current
     again     whether to repeat walks at tighter tolerances to measure their numerical error
     answers   results so far, by stage
     left_out  reasons why stages are left out, by stage
@@ -47,20 +47,20 @@ class Planner:
         steps = []
         for stage in self.stages:
             step = self.decide(stage)
-            if not (stage.only_by and step.action == "run"):  # an optional result counts only if it exists
+            if not (stage.only_by and step.action == "run"):  # an optional result is used only if it exists
                 self.expect(step)
             steps.append(step)
         return tuple(steps)
 
     def decide(self, stage: Stage) -> Step:
-        """Decide whether to reuse, run or leave out a stage, after the same decision for its inputs.
+        """Decide whether to reuse, run or leave out a stage. Its inputs must have been decided before.
 
         Optional inputs outside this plan are looked up first. If one is damaged, it is recorded as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
                 step = self._judge(self.graph[name], force=False)
-                # An optional result in another folder is not copied here, so only one in this folder counts.
+                # Optional results in other folders are not copied, so they do not count.
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
                 elif step.damaged:
@@ -106,7 +106,7 @@ class Planner:
 
     def _identity(self, stage: Stage) -> Identity:
         keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
-        # a drawing states why results are left out, so the reasons are part of its identity
+        # A drawing shows the reasons why results are left out, so they are part of its identity.
         keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
         return self.results.keys.identity(stage, self.config, keys, self.again)
 
@@ -122,7 +122,7 @@ class Planner:
 
 
 def omission_of(stage: str, why: str) -> LeftOut:
-    """Describe a stage that is left out, with the reason and what that saves."""
+    """Describe a stage that is left out, with the reason and the savings."""
     return LeftOut(stage, why, "loading and compiling contact code" if why == message_without_block("contact") else "")
 
 
@@ -186,7 +186,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
 
 
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """Return a stage's result from the results of its run.
+    """Return the result of a stage from the `results` of its run.
 
     Raises StaleError if it is missing.
     """
@@ -199,7 +199,7 @@ def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, gra
 def results_to_show(
     folder: RunFolder, stages: Iterable[str], warn: Callable[[str], None], graph: Graph = PIPELINE
 ) -> Iterator[dict[str, Stored]]:
-    """Give a `with` block the existing results of these stages, and warn of outdated ones.
+    """Lend the existing results of these stages to a `with` block, and warn of outdated ones.
 
     Raises StaleError as `results_in` does, and if the block reads something that an outdated result lacks.
     """
@@ -222,7 +222,7 @@ def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPE
 
 @contextlib.contextmanager
 def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = PIPELINE) -> Iterator[None]:
-    """Convert a KeyError raised in a `with` block to StaleError if any results are outdated."""
+    """Convert a KeyError in a `with` block to StaleError if results are outdated: they may lack the key."""
     try:
         yield
     except KeyError as missing:

@@ -64,8 +64,8 @@ def resolve(
     for stage in PIPELINE.stages:
         stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
-    # A name that the user chose does not show the changes, so the source must, or other results in that folder would
-    # seem to be of the same config.
+    # A name that the user chose does not show the changes, so the source must. Otherwise other results in that folder
+    # would seem to be of the same config.
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
     return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), files.config_to_extend(text))
@@ -89,7 +89,7 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
     except ConfigError:
         return file.label, ["it is no longer valid"]
     changed_keys = {key_of(change) for change in folder.changes}
-    # a setting in degrees changes the slope in radians, and angles of a start may follow from any setting
+    # A setting in degrees changes slope_rad, and any setting may change angles of the start.
     changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
     before, after = (dict(flatten(dump)) for dump in dumps)
@@ -101,9 +101,7 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
 
 
 def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
-    """Warn if the file of a run's config was edited since. `config` is that of the run, or None if it
-    cannot be read.
-    """
+    """Warn if the config file of a run was edited after the run. `config` is that of the run, or None if unreadable."""
     if config is None:
         return
     file, edits = edits_since(config, folder)
@@ -145,7 +143,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, files.ConfigFile] | None:
-    """Return the run with this name or folder, and its config, or None if there is no such run."""
+    """Return the run whose name or folder is `text`, with the config of the run, or None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
         return None

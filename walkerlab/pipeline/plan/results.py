@@ -1,4 +1,4 @@
-"""Stores of results, in a run's folder or in memory, and the identity that says whether a result is up to date."""
+"""Stores of results, in a run's folder or in memory, and the identities by which results are up to date or not."""
 
 import json
 import mmap
@@ -13,7 +13,7 @@ from typing import Any, Literal
 from walkerlab.code_digest import Sources, digest_of
 from walkerlab.config.reads import slice_of
 from walkerlab.config.schema import Config
-from walkerlab.extensions import WORDS, declared, extensions
+from walkerlab.extensions import WORDS, code_by_word, extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store import artifact, provenance
@@ -28,14 +28,15 @@ class Keys:
     """Builds identities of results. Parts that do not depend on the config are computed once per stage."""
 
     def __init__(self, graph: Graph = PIPELINE) -> None:
-        """Start without digests, which are computed on first use."""
+        """Create an empty cache of digests, which are computed on first use."""
         self.graph = graph
         self._sources = Sources()
         self._digests: dict[tuple[str, ...], str] = {}
 
     def compute_keys(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all its inputs, by stage. Raises the same errors as
-        `Graph.needed_in_memory`.
+        """Return the keys of a stage and of all its inputs, by stage.
+
+        Raises the errors of `Graph.needed_in_memory`.
         """
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
@@ -46,7 +47,7 @@ class Keys:
     def identity(self, stage: Stage, config: Config, input_keys: Mapping[str, str], again: bool = True) -> Identity:
         """Return the identity of a stage's result under a config.
 
-        input_keys  keys of its inputs, by stage
+        input_keys  keys of the inputs, by stage
         again       as for `call_stage`; true for every stored result
         """
         once = {} if again else {"again": False}
@@ -68,12 +69,12 @@ class Keys:
 def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     """Return the code of extensions, as "module:name", that a stage's result depends on.
 
-    This is the code of the laws named in its part of the config and in `own`, its other dependencies. For drawings it
-    is the code of everything drawn.
+    This is the code of the laws that its part of the config names, or its other dependencies, `own`. For drawings it is
+    the code of everything drawn.
     """
     text = json.dumps(own)
-    # If the word is the value of another key, the result depends on more code than necessary, which does no harm.
-    used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}
+    # If the word is the value of another key, the identity contains more code than necessary, which does no harm.
+    used = {code for key in WORDS for word, code in code_by_word(key).items() if json.dumps(word) in text}
     if stage.draws:
         used |= {code for extension in extensions().values() for code in extension.drawing_code()}
     return used
@@ -83,7 +84,7 @@ Action = Literal["reuse", "run", "leave out"]
 
 UP_TO_DATE = "up to date"
 REMEMBERED = 256
-"""Number of results kept in memory; neighbouring points of a sweep often share inputs."""
+"""Number of results kept in memory. They pay off because neighbouring points of a sweep often share inputs."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ class FolderResults:
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
             return Step(stage, "reuse", reason, identity, stored)
-        # a drawing consists of files next to its artifact, so each folder needs its own
+        # Drawings are never shared, because they consist of files next to the artifact.
         looks = self.elsewhere and not force and not stage.draws
         match = find_elsewhere(self.run, stage.name, identity.key) if looks else None
         if match is not None and not recomputed_input(stage, match[1], inputs):
@@ -135,7 +136,7 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """Link or copy the file of a result in another run's folder, if the step reuses one.
+        """If the step reuses a result from the folder of another run, link or copy its file.
 
         Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
         """
@@ -183,7 +184,7 @@ class FolderResults:
 
 
 def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
-    """Name an input whose content has changed since the result was computed, or return '' if no input has."""
+    """Say which input was recomputed with other content since the result was stored, or return '' if none was."""
     for name, result in inputs.items():
         if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
@@ -199,9 +200,7 @@ def input_digest(stage: Stage, result: Content) -> str:
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find the file and result for a key in another run folder, or return None if no folder has it. Damaged files are
-    ignored.
-    """
+    """Find file and result for a key in another run folder, or return None. Damaged files are ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -224,14 +223,14 @@ def mentions(path: Path, key: str) -> bool:
 
 
 class LoadedCodeKeys(Keys):
-    """Builds identities for this process only. Its code does not change, so they need no code digest."""
+    """Builds identities for this process only. They need no code digest, because loaded code does not change."""
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:  # noqa: ARG002
         return ""
 
 
 class MemoryResults:
-    """Latest results that other stages need, kept in memory."""
+    """Results in memory: the latest ones that other stages need."""
 
     folder = None
 

@@ -1,6 +1,6 @@
 """Stages of a pipeline, and the options of their commands.
 
-Extensions declare their stages with this file, and the command line builds its help from them, so the file imports no
+Extensions declare their stages with this file, and the help of the command line is built from them. So it imports no
 stage, no config schema and no NumPy.
 """
 
@@ -26,11 +26,11 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
 ]
-"""How an option's value is read; docs/adding.md has a table."""
+"""Ways to read the value of an option. They are listed in docs/adding.md."""
 
 
 def message_without_block(name: str) -> str:
-    """Return the message that the config lacks a block."""
+    """Return the message that the config lacks the block `name`."""
     return f"the config has no {name} block"
 
 
@@ -39,18 +39,18 @@ def nothing(_config: object) -> tuple[Any, ...]:
     return ()
 
 
-def nothing_else(_config: object) -> Mapping[str, Any]:
-    """Return an empty mapping, for stages whose results depend on nothing else."""
+def no_dependencies(_config: object) -> Mapping[str, Any]:
+    """Return an empty mapping, for stages whose results depend only on config, inputs and code."""
     return {}
 
 
 def dependency(name: str, code: str) -> Callable[[Config], Mapping[str, Any]]:
-    """Return a function that returns the value of a function of the config, "module:name", under a name."""
+    """Return a function of the config whose result is {name: value}. `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
 
 
 def results_of(*names: str) -> Inputs:
-    """Return a function that returns these stage names for every config."""
+    """Return a function of the config that returns these stage names for every config."""
     return lambda _config: names
 
 
@@ -67,7 +67,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 
 def walks_and(*names: str) -> Inputs:
-    """Return a function that returns the walking stages, `recorded-walk` if there is a recording, and `names`."""
+    """Return a function of the config that returns the walking stages, `recorded-walk` if recorded, and `names`."""
     return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
@@ -81,19 +81,17 @@ class Option:
     help: str
     kind: OptionKind = "word"
     needs: tuple[str, ...] = ()  # flags that must be given with it
-    runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
+    runs: str = ""  # stage that the command runs instead if the option is given; such an option sets no key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return options for facts that a recorded file does not state. They set keys of a block, and need some other
-    flags.
-    """
+    """Return options for facts that a recording does not state. They set keys of `block` and need the flags `needs`."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
-        Option("--units", "units", "KIND=UNIT,...", "Units of columns whose file does not state them.", "units"),
+        Option("--units", "units", "KIND=UNIT,...", "Units of columns, where the file does not state them.", "units"),
         Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
         Option(
             "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line from which angles are measured."
@@ -116,25 +114,25 @@ class Stage:
     name: str  # name of the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # type of the config slice that `run` takes and its result depends on, or a function from a config to this type;
-    # None for the whole config
+    # Type of the slice of the config that `run` takes and the result depends on, or a function from a config to this
+    # type. None means the whole config.
     takes: type | Callable[[Config], type] | None
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
     needs_equal_legs: bool = False
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
     options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
-    # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
+    # "times": measures run times, so it must run alone. "draws": also writes files, from the results that exist.
     work: Literal["computes", "times", "draws"] = "computes"
-    # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
+    # The only command that runs the stage (that of its name or `STAGE --full`). Empty if all commands that need it do.
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     # returns what else the result depends on, by name, such as digests of files and versions of other programs
-    depends_on: Callable[[Config], Mapping[str, Any]] = nothing_else
+    depends_on: Callable[[Config], Mapping[str, Any]] = no_dependencies
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
-    # "module:name" of the `Offer` of the stage's command; empty for the usual one, which works on a run
+    # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
     adds_command: str = ""
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that show this one's result if it is current
@@ -158,10 +156,10 @@ class Stage:
         return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: Config) -> str | None:
-        """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
+        """Return the reason why the stage has no result for the legs of a config, or None if it has one."""
         if not self.needs_equal_legs:
             return None
-        # Imported here: the command line's help needs neither, and equal legs need no mechanics.
+        # Imported here to keep the help of the command line fast. Equal legs need no mechanics.
         from walkerlab.config.second_leg import states_second_leg
 
         if not states_second_leg(config):
@@ -182,7 +180,7 @@ class Stage:
                 f"{target} needs two equal legs, but those of this walker differ.",
                 f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
             )
-        # Imported here: the command line's help needs neither.
+        # Imported here to keep the help of the command line fast.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
         if self.why_unsuited(config) is not None:
@@ -208,5 +206,5 @@ class Stage:
 
     @property
     def on_demand(self) -> bool:
-        """Whether only the stage's own command runs it."""
+        """Whether the stage runs only by the command of its name."""
         return self.only_by == self.name

@@ -19,7 +19,7 @@ from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 COMPILING_BUDGET = 200  # right-hand sides, enough for the first step of each method
-# One method for each form of the kernels: our two, and one of another library, which calls parts of them from Python.
+# One method for each form of the kernels: our two, and one of another library, which calls kernels from Python.
 COMPILED_METHODS = ("radau5", "dop853", "scipy-radau")
 
 
@@ -97,7 +97,7 @@ PARTS: tuple[Callable[[Config], None], ...] = (
     compile_plain_systems,
     compile_lanes,
 )
-"""Functions that compile some kernels of a config, those that take longest first."""
+"""Functions that compile parts of the kernels of a config, the slowest first."""
 
 
 def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
@@ -109,9 +109,7 @@ def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
 
 
 def compile_ahead(configs: Iterable[Config], jobs: int) -> set[str]:
-    """Compile all kernels of some configs that the package and the cache lack, and return the names of all
-    their files.
-    """
+    """Compile the kernels of some configs that package and cache lack. Return the names of the files of all kernels."""
     calls = [partial(compile_part, part, config) for config, part in product(configs, PARTS)]
     return set[str]().union(*map_in_order(calls, jobs))
 
@@ -132,9 +130,7 @@ def build(folder: str) -> None:
 
 
 def write_machine_code(folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """Copy files from the cache to the package's folder. Store and return the versions and the processor that they
-    need.
-    """
+    """Copy files from the cache to a folder of the package. Store and return the versions and processor they need."""
     from walkerlab.physics.compiler import strip_bitcode
 
     folder.mkdir(exist_ok=True)

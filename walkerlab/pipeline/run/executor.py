@@ -26,7 +26,7 @@ from walkerlab.pipeline.store.files import storage_errors
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 
 Task = Callable[[StageReporter], Content]
-"""A stage with its arguments; called with a reporter, it runs the stage."""
+"""Call of a stage with its arguments. It takes a reporter and returns the result."""
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
@@ -49,7 +49,7 @@ def call_stage(
                left_out    results that are missing in a drawing, with the reasons
                early       what this run has drawn early from some of the results; None if nothing
     """
-    # imported only now, because a stage loads libraries and compiled code
+    # Imported only when the stage runs, because stages load libraries and compiled code.
     run = importlib.import_module(module).run
     arguments = {name: offered[name] for name in offered.keys() & signature(run).parameters.keys()}
     folder = arguments.get("folder")
@@ -86,7 +86,7 @@ def run_in_worker(task: Task) -> Content:
 
 @dataclass(frozen=True)
 class RunningStage:
-    """A running stage."""
+    """Stage that has started and not ended."""
 
     step: Step
     task: Task
@@ -125,7 +125,7 @@ class Executor:
             with WorkerPool(self.jobs) as pool:
                 while self._waiting or self._running:
                     self._start_ready_stages(pool if side_by_side else None)
-                    # Messages of running stages also arrive here. Only the end of a call lets another stage start.
+                    # The queue also holds messages of running stages. Only the end of a call lets another stage start.
                     while self._working and not self._events.get()():
                         pass
                     self._early.draw(self._waiting, self._unsettled(), STILL_COMPUTED)
@@ -168,7 +168,7 @@ class Executor:
                 future = pool.start(call, partial(self._hear, running_stage.reporter))
                 self._running[future] = running_stage
                 self._working.add(future)
-                # Callbacks run in other threads, so they only put a call into the queue of this one.
+                # Callbacks run in other threads. They only queue a call, so that this thread alone changes the state.
                 future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 
     def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
@@ -234,8 +234,7 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Make the drawings for which the results so far suffice. `why` explains the missing results of `unsettled`
-        stages.
+        """Make the drawings for which the results so far suffice. `why` is why `unsettled` stages have no results.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """
@@ -284,7 +283,7 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
 
 
 def short_reason(why: str) -> str:
-    """Cut a reason off before it quotes another stage's reason or error, which is shown on a line of its own."""
+    """Cut a reason off where it begins to quote another stage, whose reason or error has a line of its own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 

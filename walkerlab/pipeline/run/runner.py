@@ -39,7 +39,7 @@ class StageReport:
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
     summary: dict[str, Any]  # summary of the result; empty if there is no result
     steps: tuple[Step, ...]  # action taken for each stage
-    # error of the stage if it has no answer, otherwise of the first stage without one; None if all have answers
+    # Error of the stage if it has no answer, otherwise of the first stage without one. None if all have answers.
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Options:
     """Options for running a stage."""
 
     force: bool = False  # run the stage and all that it needs, even if their results are current
-    wait: bool = True  # wait for another process that works in the folder, then reuse its results
+    wait: bool = True  # wait for another process that works in the folder, then reuse what it has stored
     jobs: int = 1  # maximum number of processes, for independent stages and for independent work units of a stage
     full: bool = False  # also run the stage's long campaigns
     dry: bool = False  # only report the plan, without changing a file
@@ -89,7 +89,7 @@ def execute(
 
     Raises ConfigError if the config lacks a block that the target requires or the folder holds results of another
     config, LockedError if another process works in the folder and `options.wait` is false, and StorageError. A stage
-    without an answer raises nothing; see `StageReport.no_answer`.
+    without an answer raises nothing, see `StageReport.no_answer`.
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)
@@ -112,7 +112,7 @@ def execute(
         reused = "" if options.force else "; its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
-            # decide again: another process may have worked in the folder until now
+            # Decide again, because another process may have worked in the folder until now.
             run = executor()
             run.carry_out([step.stage for step in steps if step.action == "run"])
     else:
@@ -147,7 +147,7 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     base = paper_config_with({}) if run.extends == DEFAULT else run.loaded.base
     # The new config describes the walker, not the question that found it.
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
-    # A path in `extends` is relative to the file that contains it.
+    # A path in `extends` is relative to the file in which it stands.
     typed = run.extends if run.extends in builtin_names() else os.path.relpath(run.extends, report.run_dir)
     return write_numbered(
         report.run_dir / f"{name}.yaml", to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
@@ -192,7 +192,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target or, if it has an answer, of the first stage that has none. None if all have one.
+    """Return the error of the target or, if it has an answer, of the first stage without one, or None if all have one.
 
     message  message and advice of the target's error; None if it has an answer
     """

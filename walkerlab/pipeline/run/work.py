@@ -16,13 +16,13 @@ from walkerlab.pipeline.run.workers import SizedExecutor, WorkerDiedError, Worke
 from walkerlab.pipeline.store.files import Checkpoint, Numbers
 
 SCOUTS: Final = 2
-"""Size of the first batch. It runs alone, so that the kernels are compiled only once, and shows the time of a unit."""
+"""Size of the first batch. It runs alone: it compiles the kernels for all, and shows how long a unit takes."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
-"""A batch is at most 1/SHARES of the work left per worker (or MIN_BATCH_S long), so that all workers end together."""
+"""A batch is at most 1/SHARES of the remaining work per worker (or MIN_BATCH_S), so that all workers end together."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
-"""Errors that indicate a bug; a retry would only repeat them."""
+"""Errors that indicate a bug. They are not retried, because a retry would only repeat them."""
 MAX_DEATHS: Final = 12
 """Maximum number of worker deaths before the first result. If there are more, the cause is the machine, not the work.
 """
@@ -32,7 +32,7 @@ NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, befor
 
 
 class WorkUnit(NamedTuple):
-    """Piece of work that is computed as a whole and stored under its name."""
+    """Piece of work that is computed as a whole. The result is stored under `name`."""
 
     name: str
     size: int  # number of parts that the unit adds to the progress
@@ -58,11 +58,11 @@ class InPlace(SizedExecutor):
 
 
 class JobEndsError(BaseException):
-    """Error that a signal raises in a job that a cluster is about to end."""
+    """Raised in a cluster's job by the signal that announces its end."""
 
 
 class JobEndedError(WalkerlabError):
-    """Error for a cluster's job that ended before it had computed one unit."""
+    """Raised for a cluster's job that ended before it had computed one unit."""
 
     exit_code = 4
 
@@ -95,10 +95,10 @@ class Spread:
     def run(self, executor: SizedExecutor) -> None:
         """Compute all units.
 
-        Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs immediately.
+        Raises NoAnswer if workers keep dying before they compute anything, and bugs immediately.
         """
         while self.left or self._again or self._running:
-            # One batch more than there are workers is queued, so that no worker waits.
+            # One batch more than workers is handed out, so that no worker has to wait for its next one.
             max_running = 1 if self.unit_s is None else executor.size + 1
             while len(self._running) < max_running and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(executor.size), 0)
@@ -111,7 +111,7 @@ class Spread:
                 if results:
                     self._arrived(batch[: len(results)], results)
                     rest = batch[len(results) :]
-                    # The worker was about to be ended, which is no failure of the units that it left.
+                    # The worker had to end before it came to these units, which does not count as a failure.
                     self._again.extend([(rest, 0)] if rest else [])
                 else:
                     self._failed(batch, failures, error or JobEndedError(NOTHING_COMPUTED))
@@ -155,7 +155,7 @@ class Spread:
         elif failures < 3:
             self._again.append((batch, failures + 1))
         else:
-            # Without a time, all further batches would run alone.
+            # If it stayed None, all further batches would run alone.
             self.unit_s = self.unit_s or 1.0
             self.give_up(batch[0], error)
 

@@ -2,7 +2,7 @@
 
 A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
 scripts without a guard, code from standard input and notebooks can use workers. Workers end when their parent ends,
-for whatever reason; the parent handles keyboard interrupts.
+for whatever reason. The parent handles keyboard interrupts.
 
 Signals that stop a command raise an error in the main thread, but not inside LLVM callbacks, which lose it.
 """
@@ -56,7 +56,7 @@ def raise_on(number: int, error: type[BaseException]) -> None:
 
 
 def is_called_back(frame: FrameType | None) -> bool:
-    """Whether a frame or one of its callers is an LLVM callback."""
+    """Whether a frame is that of an LLVM callback, or was called by one."""
     while frame is not None:
         if frame.f_code.co_name.startswith(CALLED_BACK):
             return True
@@ -67,7 +67,7 @@ def is_called_back(frame: FrameType | None) -> bool:
 def end_with_parent() -> None:
     """End this process and everything it has started as soon as its parent is gone.
 
-    This process must lead its session; the parent must hold the other end of standard input and never write to it.
+    This process must lead its session. The parent must hold the other end of standard input and never write to it.
     """
 
     def watch() -> None:
@@ -110,7 +110,7 @@ class WorkerDiedError(WalkerlabError):
         )
         self.exit_code_of_worker = exit_code
 
-    # By default, an error is restored from its message, which is not what `__init__` takes.
+    # By default, pickle would pass the message to `__init__`, which takes an exit code.
     def __reduce__(self) -> tuple[type, tuple[int]]:
         return type(self), (self.exit_code_of_worker,)
 
@@ -177,7 +177,7 @@ class Worker:
         Raises WorkerDiedError and WorkerTimeoutError.
         """
         work = pickle.dumps(call)
-        with contextlib.suppress(OSError):  # a dead worker is noticed because its answer is missing
+        with contextlib.suppress(OSError):  # if the worker is dead, its missing answer shows it below
             self._line.send_bytes(work)
         while isinstance(message := self._receive(timeout_s), CallMessage):
             if hear is not None:
@@ -193,7 +193,7 @@ class Worker:
                 raise WorkerTimeoutError
             message: CallMessage | Answer = self._line.recv()
         except (EOFError, OSError):
-            raise WorkerDiedError(self.ended()) from None
+            raise WorkerDiedError(self.wait_for_end()) from None
         return message
 
     @property
@@ -204,7 +204,7 @@ class Worker:
         """Ask the process to drop its call and end."""
         self.process.terminate()
 
-    def ended(self) -> int:
+    def wait_for_end(self) -> int:
         """Wait until the process ends, kill it if that takes too long, and return its exit code."""
         try:
             return self.process.wait(WORKER_PATIENCE_S)
@@ -214,7 +214,7 @@ class Worker:
 
     def close(self) -> None:
         self.leave()
-        self.ended()
+        self.wait_for_end()
         self._line.close()
 
 
@@ -231,7 +231,7 @@ class WorkerPool(SizedExecutor):
         """Set up at most `size` workers without starting one. `modules` and `environment` are as in `Worker`."""
         self.size = size
         self._new_worker = partial(Worker, modules, environment)
-        self._threads = ThreadPoolExecutor(size)  # each thread waits for one worker
+        self._threads = ThreadPoolExecutor(size)  # each thread waits for the answer of one worker
         self._lock = threading.Lock()
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
@@ -262,7 +262,7 @@ class WorkerPool(SizedExecutor):
         finally:
             with self._lock:
                 self._busy.remove(worker)
-                # If the worker has died, the next call removes it from the list.
+                # The worker may have died. The next call removes it from the list then.
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -274,7 +274,7 @@ class WorkerPool(SizedExecutor):
         for worker in workers:
             worker.leave()
         for worker in workers:
-            worker.ended()
+            worker.wait_for_end()
         self._threads.shutdown()  # wait until no thread listens to a worker
         for worker in workers:
             worker.close()
@@ -290,7 +290,7 @@ def map_in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index. Low ranks start first; long calls should have them, so that no call runs alone at the end
+    rank   rank of an index. Low ranks start first. Give them to long calls, so that no long call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -317,7 +317,7 @@ def tell(value: Any) -> None:
 
 
 _lines: list[Connection] = []
-"""Connection to the parent process in a worker; empty in any other process."""
+"""Connection to the parent process. Empty if this process is not a worker."""
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
@@ -328,14 +328,14 @@ def serve(number: int, modules: Sequence[str]) -> None:
     _lines.append(line)
     calls: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=receive, args=(line, calls), daemon=True).start()
-    # until the handler below is set, a signal simply ends the process
+    # Until the handler below is set, a signal simply ends the process.
     for module in modules:
         importlib.import_module(module)
     with contextlib.suppress(LeaveError):
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
-    # the call was dropped; a second signal (terminal and parent may each send one) simply ends the process
+    # The call was dropped. Terminal and parent may each send a signal, so a second one simply ends the process.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 

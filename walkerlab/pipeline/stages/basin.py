@@ -67,10 +67,10 @@ def run(
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
-    # Work units return floats, which a checkpoint can hold.
+    # Work units return floats, because a checkpoint can store only these.
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
-    # A walk that fails is another end than one that goes on without reaching an attractor.
+    # The edge of the basin also separates walks that fail from walks that go on without reaching an attractor.
     edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
@@ -208,10 +208,8 @@ def gaussian(window: grid.Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing if no
-    cell fails.
-    """
-    # The distance is only as accurate as a cell is small.
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing without one."""
+    # The error of the distance is the size of a cell.
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}
@@ -249,7 +247,7 @@ class RigidQuestion:
         return rows
 
     def walk_to_ends(self, z: Floats) -> grid.WalkEnds:
-        """Simulate walks from section coordinates z (n, 3), SI, until each ends or reaches an attractor."""
+        """Simulate walks from section coordinates z (n, 3) in SI, until each ends or reaches an attractor."""
         scaled = z * np.array(self.scale)
         return grid.walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 

@@ -34,7 +34,7 @@ from walkerlab.scene.omissions import contact_walk_omissions
 from walkerlab.scene.parts import TORSO
 from walkerlab.scene.rigid import foothold_heights
 
-RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
+MAX_TOLERANCE_RATIO = 0.1  # above this ratio of tolerance to stiction velocity, slips are not resolved
 SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
@@ -71,7 +71,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: Progress) -> None:
     """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
-    if atol > RESOLVED * rising:
+    if atol > MAX_TOLERANCE_RATIO * rising:
         progress.note(
             f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large relative to contact.stiction_velocity "
             f"({rising:g} m/s), up to which friction rises, so friction and the outcome may be due to chance"
@@ -79,7 +79,7 @@ def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: 
 
 
 def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
-    """Return the asymmetry of a walk's last stride, with that of the times from touch to lift, leg 2 minus leg 1."""
+    """Return the asymmetry of the last stride, with that of the stance times (touch to lift), leg 2 minus leg 1."""
     # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
     count = walk.steps - walk.steps % STRIDE
     if not count or walk.stance_s.size < count:
@@ -104,7 +104,7 @@ def summary(config: ContactSimConfig, scene: contact.ContactScene, walk: Contact
         "rolling_m": walk.rolling_m.tolist(),
         "energy_balance_residual_J": walk.energy_balance_residual_J,
         "dissipated_J": losses_by_channel(scene.walker, walk.dissipated_J),
-        # old key of the knee strike times, kept until version 0.3; -1 where a knee did not lock
+        # This old key of the knee strike times is kept until version 0.3. It has -1 where a knee did not lock.
         **(
             {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
         ),

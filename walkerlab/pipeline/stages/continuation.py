@@ -31,10 +31,10 @@ from walkerlab.scene.subject import contact_map, model_differs, rigid_map, steps
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
-"""Seeds, and a function that returns a config's step map over the parameter."""
-SHORTEST_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
+"""Seeds of a search, and a function that returns the step map of a config over the parameter."""
+MIN_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
+TIGHT_EFFORT = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
@@ -47,10 +47,10 @@ class FamilyQuestion:
     span: ValueSpan
 
     def start_values(self) -> list[float]:
-        """Return the values at which the search looks for gaits, the config's own value first."""
+        """Return the values at which the search looks for gaits, the value in the config first."""
         current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
-        # A gait is most likely at the config's own value.
+        # A gait is most likely at the value in the config.
         return [*([current] if current in self.span else []), *(float(value) for value in spread)]
 
     @property
@@ -111,8 +111,8 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
         search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
         # A branch may consist of a single point if it can be followed in neither direction.
-        short = SHORTEST_REACH * question.span.size
-        isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
+        short = MIN_REACH * question.span.size
+        isolated += [isolated_gait(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
     answer = summary(families, question, again)
     second = question.second
@@ -137,7 +137,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models whose gaits are followed.
 
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
-    of a span is invalid, or the second key equals the first or has a range without the config's own value.
+    of a span is invalid, or the second key equals the first or has a range without the value in the config.
     """
     config = question.config
     second = question.second
@@ -306,7 +306,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 def sample_again(family: Family) -> dict[str, Any] | None:
     """Solve again for a sample of gaits at tighter tolerances. Return the largest changes, or None without a gait."""
-    # Gaits are solved again, not only simulated, so that the change includes the residual of Newton's method.
+    # A simulation alone would not show the residual of Newton's method.
     step_map = family.step_map
     every = [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
@@ -314,7 +314,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     tighter, by = tightened(step_map.tolerances)
     otherwise = step_map.replace_tolerances(tighter)
     repeated = [
-        (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
+        (point, gait_near(otherwise, point.z, point.value, TIGHT_EFFORT, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [
@@ -398,7 +398,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     attractors = family.attractors
     exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
-    # Between the last flip that was followed and the limit of the cascade, gaits of longer periods are stable.
+    # Gaits of longer periods than were followed are stable from the last flip to the limit of the cascade.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
         attractor.value
@@ -439,7 +439,7 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
             yield {"period": period, "share": cells / family.regions.period.size}
 
 
-def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
+def isolated_gait(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
     """Describe a gait that cannot be followed in either direction, because the step map is discontinuous there."""
     gait = branch.points[0]
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"

@@ -1,4 +1,4 @@
-"""Optimise a quantity of a walker's gait by varying parameters within bounds."""
+"""Optimise a quantity of the gait by varying parameters of the walker within bounds."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -36,9 +36,9 @@ from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unre
 
 SOLVED: Final = Effort(1e-10)
 DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
-FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; a coarser one would add noise that misleads the search
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; if it were coarser, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
-MEETING: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
+MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
     "start": Label("SI", "start of the search"),
@@ -50,7 +50,7 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum.
 
-    checkpoint  results of searches that an earlier run completed; new results are added
+    checkpoint  results of searches that an earlier run completed, to which new results are added
 
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
@@ -72,7 +72,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         progress.start(f"design: search {number + 1} of {design.starts}")
         name = f"search {number}"
         before = gaits.counts.copy()
-        # Every search begins with the same gait, so that its result does not depend on the searches before it.
+        # Otherwise the result of a search would depend on the searches before it.
         gaits.z = own_z
         if name in checkpoint.kept:
             entry = np.array(checkpoint.kept[name])
@@ -116,7 +116,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         "without_gait": int(gaits.counts[1]),
         "optima": ends,
         "starts": design.starts,
-        "multipliers_meet": best.point.apart < MEETING,
+        "multipliers_meet": best.point.apart < MEETING_GAP,
         "robustness": [
             {"quantity": name, **{place: of[name] for place, of in robust.items() if name in of}} for name in ROBUSTNESS
         ],
@@ -146,7 +146,7 @@ def refuse(config: DesignConfig) -> None:
         refuse_unread("design.over", key, config, (design.model,))
     current = [parameter.value_in(config) for parameter in parameters]
     bounds = list(design.over.values())
-    # A bound is valid if it is so with the present values of the other keys, with all their lower or all their upper
+    # Each bound must be valid together with the config's values of the other keys, or with all lower or all upper
     # bounds.
     corners = np.column_stack((current, bounds)).T
     for index, parameter in enumerate(parameters):
@@ -184,7 +184,7 @@ class Gaits:
         self.largest = wanted & LARGEST.keys()
         self.steps = config.robustness.steps
         self.gaps = [DIFFERENCE * (high - low) for low, high in design.over.values()]
-        self.counts = np.zeros(2, int)  # numbers of evaluations: all, and those without a gait
+        self.counts = np.zeros(2, int)  # numbers of all evaluations, and of those without a gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
         self.z = find_model_gait(design.model, config, gait, progress.note).z
@@ -206,8 +206,7 @@ class Gaits:
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.gait_on_map()
         match = self.gait_near(standpoint, self.z)
-        # The parameters may be too far from those of the last gait for Newton's method, so the search starts from
-        # scratch.
+        # Newton's method may have failed because the last gait belongs to distant parameters.
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
@@ -227,7 +226,7 @@ class Gaits:
                 return None
             smooth = {name: of_key[name].value or 0.0 for name in self.wanted}
             by_key.append(smooth | self.differentiate_largest(subject, numbers, parameter, gap))
-        # Both multipliers of a complex pair have the same magnitude, which does not count as a meeting.
+        # Only one multiplier of each complex pair counts. Otherwise every pair would be a meeting.
         moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
         apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
         gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}

@@ -11,7 +11,7 @@ from walkerlab.scene.identification import SCALE_OF_ZERO
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.subject import refuse_unread
 
-EXACT: Final = 1e-9  # a prior whose standard deviation is below this fraction of its value counts as exact
+EXACT_PRIOR: Final = 1e-9  # a prior whose standard deviation is below this fraction of its value counts as exact
 
 
 def refuse_model(config: ContactConfig, block: Identify) -> None:
@@ -25,7 +25,7 @@ def refuse_keys(config: ContactConfig, block: Identify) -> None:
     refuse_values(config, "fit", block.fit, block.models)
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, block.models)
     for key, (value, sigma) in block.prior.items():
-        if sigma < EXACT * (abs(value) or SCALE_OF_ZERO):
+        if sigma < EXACT_PRIOR * (abs(value) or SCALE_OF_ZERO):
             raise ConfigError(
                 f"identify.prior: {key} has a standard deviation of {sigma:g}, too small for its value, {value:g}.",
                 f"A value that is known exactly belongs in the config (--set {key}={value:g}), without --prior.",

@@ -26,7 +26,7 @@ from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
 MOTIONS_OF_BRANCH = 12  # number of gaits per branch whose walks are stored
-LONGEST = 4  # steps, maximum period of these gaits
+MAX_MOTION_PERIOD = 4  # maximum period (steps) of these gaits
 STRIDE = 2  # number of steps after which the legs have the same roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
@@ -66,7 +66,7 @@ def groups(
 ) -> dict[str, Group]:  # fmt: skip
     """Build a group for each branch, each curve, and the bifurcations, exponents and attractor of each model.
 
-    answer  summary of the stage; its branches, bifurcations and curves are also stored as tables
+    answer  summary of the stage, whose branches, bifurcations and curves are also stored as tables
     second  second parameter, if gaits are followed over a plane
     """
     value = {"value": Label(parameter.unit, parameter.key)}
@@ -134,11 +134,11 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return a list of the flip at which a branch begins, with two periods of the gait there, or an empty list."""
+    """Return the flip at which a branch begins, with two periods of the gait there, or an empty list."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
-                # A branch that was found from a seed may begin with another step of the gait than its parent.
+                # A branch that was found from a seed may begin with another step of the gait than its parent does.
                 steps = [np.tile(values, 2) for values in (flip.gait.periods_s, flip.gait.angles)]
                 first = branch.points[0].periods_s
                 shift = min(range(parent.period), key=lambda k: float(np.abs(np.roll(steps[0], k) - first).max()))
@@ -174,7 +174,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
-        if branch.period <= LONGEST
+        if branch.period <= MAX_MOTION_PERIOD
         for place in evenly_spread(len(branch.points), MOTIONS_OF_BRANCH)
         for group in motion(branch.points[place], branch.period, config, parameter)
     }
@@ -196,7 +196,7 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     if walk.steps < steps or walk.samples is None:
         return
     changes = np.flatnonzero(np.diff(walk.samples.step))
-    # Velocities jump at heel strikes, so the samples on both sides of them are kept.
+    # Both sides of heel strikes are kept. Without them, the jumps of the velocities would be lost.
     selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, SAMPLE_STRIDE), changes, changes + 1)))
     samples_group = trajectory_group(scene, walk, select_samples(walk.samples, selected))
     yield replace(samples_group, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

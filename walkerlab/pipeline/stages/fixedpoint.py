@@ -45,7 +45,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 
     again  whether to name nearby gaits if none is found, which takes a second
 
-    Raises NoAnswer if the config's own set has no physical gait.
+    Raises NoAnswer if the set of equations in the config has no physical gait.
     """
     sets = equation_sets(config)
     searches: dict[str, GaitSearch] = {

@@ -39,7 +39,7 @@ SHOWN_STEPS = 10
 """Number of steps that the motion player shows."""
 SHOWN_SAMPLES = 800
 """Approximate number of samples that the motion player shows."""
-FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
+FIT_FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -66,7 +66,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     if verdict.fit == "not-converged":
         open_combinations = "".join(f"; open: {entry.combination}" for entry in result.not_identifiable)
         reason = f"the fit of the {verdict.model} model did not converge: {verdict.reasons[0]}{open_combinations}"
-        raise NoAnswer(reason, FEWER, content)
+        raise NoAnswer(reason, FIT_FEWER, content)
     return content
 
 
@@ -106,7 +106,7 @@ def read_data(config: IdentifyConfig) -> MeasuredFile:
 
 
 def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification]) -> Identification:
-    """Try divisions of the walk into steps, and return the first that fits or, if none does, the most usable one."""
+    """Fit each division of the walk into steps. Return the first good fit or, if none is good, the most usable one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
     for measured in file.divisions():
@@ -125,7 +125,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
 def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Fit again if the identified slope, sensors or soles move heel strikes, or keep the old fit if this one is bad."""
+    """Fit again if the identified slope, sensors or soles move the heel strikes. If that fails, keep the old fit."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
@@ -197,7 +197,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a prior, with its distance from the estimate by the walk alone, in standard errors of the difference."""
+    """Return a prior and its distance from the estimate by the walk alone, in standard errors of the difference."""
     return {
         "key": pull.key,
         "value": pull.value,
@@ -261,13 +261,13 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     """Build the identified and measured motions of the first steps, or an empty mapping for kneed walkers,
     because their shank angles are not read.
 
-    Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
+    Both motions use the identified footholds and the same phases. Angles are corrected for sensor offset and gain.
 
     config  config of the identified walker
     """
     measured = result.measured
     walker = rigid_walker(config)
-    # the leg that swings first is shown as leg 1
+    # The motion player shows the leg that swings first as leg 1.
     walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
@@ -300,7 +300,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
     """Return the masses in the config that were not fitted. The estimated masses are relative to them."""
-    # empty for the contact model, whose stiffness sets the scale of mass
+    # The contact model needs no reference, because the stiffness sets the scale of mass.
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}
     fields = (".".join(("walker", *path)) for path, _ in leaves(type(config.walker), held=config.walker))

@@ -47,10 +47,10 @@ if TYPE_CHECKING:
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
-MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
+MAX_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
+SAME_TOUCHES: Final = 0.002  # rad; smaller changes of the sum of leg angles at heel strike do not count
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -104,7 +104,7 @@ class MeasuredFile:
     def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
         """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
 
-        config  config of the walker; None for that of the file
+        config  config of the walker, or None for that of the file
         """
         steps = self.find_steps(touch_sum_rad) if config is None else self.steps_of(config, touch_sum_rad)
         if steps.touch_time_s.size < MIN_STEPS:
@@ -128,15 +128,15 @@ class MeasuredFile:
 
 
 def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
-    if measured.count > MOST_STEPS:
+    if measured.count > MAX_STEPS:
         raise ConfigError(
-            f"{path} has {measured.count} steps; at most {MOST_STEPS} are fitted at once.", "Cut it into shorter walks."
+            f"{path} has {measured.count} steps; at most {MAX_STEPS} are fitted at once.", "Cut it into shorter walks."
         )
     return measured
 
 
 def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
-    """Yield possible sums (rad) of the leg angles at heel strike, measured from the slope's normal: 0, then others."""
+    """Yield the sums (rad) to try of the leg angles at heel strike, from the slope's normal. The first is 0."""
     yield 0.0
     if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
@@ -152,7 +152,7 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
         raise ConfigError(
-            f"{block.data} is from {recording.levelled_by}, which makes the floor level: the slope turns the angles.",
+            f"{block.data} is from {recording.levelled_by}, which levels the floor, so the slope turns the angles.",
             "Give --camera-tilt floor, or --camera-tilt 0 if the recording's floor_angle was 0.",
             ("identify", "camera_tilt_deg"),
         )
@@ -194,7 +194,7 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
-    # On a treadmill a step is as long as the way of the belt from touch to touch.
+    # On a treadmill the length of a step is the distance that the belt moves from touch to touch.
     if block.belt_speed_m_s and "length_m" not in values:
         values["length_m"] = block.belt_speed_m_s * period
     if "touch_angle_rad" in values:
@@ -231,7 +231,7 @@ def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, f
 
 
 def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> None:
-    """Raise ConfigError if a value (steps,), in SI units, is impossible for a step."""
+    """Raise ConfigError if one of the `values` (steps,), in SI units, is impossible for a step."""
     angle = name == "touch_angle_rad"
     possible = [abs(value) <= math.pi if angle else is_plausible(value) for value in values.tolist()]
     if all(possible):

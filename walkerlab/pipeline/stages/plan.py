@@ -186,7 +186,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     """
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
-    # One step more than is measured: samples must lie before the last heel strike of a walk.
+    # The walk has one more step than is measured, because samples must lie before its last heel strike.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
@@ -205,7 +205,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """Predicted walk that has not been measured, with its derivatives."""
+    """Predicted walk, which has not been measured, with derivatives."""
 
     forecast: Forecast
     data: Linearised
@@ -236,7 +236,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain after measuring these quantities of the first steps, and the open combinations."""
+    """Return the errors that remain if `measured` quantities of the first steps are known, and open combinations."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
     data = walk.data
     quantities = walk.forecast.quantities

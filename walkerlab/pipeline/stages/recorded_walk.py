@@ -27,7 +27,7 @@ from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
-NOISY = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
+NOISY_RATIO = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -49,7 +49,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     if block.camera_tilt_deg == "free":
         walk = correct_tilt(walk, model)
     doubts = list(doubts_about(walk))
-    # Doubts are reported before the division into steps, which may fail because of noise.
+    # Doubts are reported first, because noise may make the division into steps fail.
     for doubt in doubts:
         progress.note(doubt)
     steps = divide_into_steps(walk, model, block.file)
@@ -60,7 +60,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Return the walk without the camera's tilt. With the right tilt the leg rates jump at the heel strikes."""
+    """Return the walk without the camera's tilt, which is found from the jumps of the leg rates at heel strikes."""
     tilt = find_tilt(walk, model)
     upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
     doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
@@ -73,7 +73,7 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
     noise = noise_of(angles)
     amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
-    if noise > NOISY * amplitude:
+    if noise > NOISY_RATIO * amplitude:
         yield (
             f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
             "heel strikes, and so periods and lengths of single steps, are uncertain."
@@ -162,7 +162,7 @@ def content_of(
 
 
 def resample_others(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
-    """Interpolate the other recorded quantities, (samples,) or (samples, 2), at the times of the samples."""
+    """Interpolate the other recorded quantities at the samples of the steps, with shape (samples,) or (samples, 2)."""
     time = walk.time_s - steps.origin_s
     besides = {}
     for name in TIME_LABELS:

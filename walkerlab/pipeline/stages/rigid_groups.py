@@ -28,7 +28,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 
 
 def rolled_distance(walker: RigidModel, turned: Any) -> Any:
-    """Return the distances (m) that the stance foot has rolled when its leg has turned back by angles (rad)."""
+    """Return the distances (m) that the stance foot has rolled once its leg has turned back by the angles `turned`."""
     return walker.radius * turned
 
 

@@ -46,7 +46,7 @@ STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """Maximum total number of steps of all walks on ground of one roughness, by model."""
 PUSH_REACTIONS: Final = ("normal_impulse_N_s", "min_normal_force_N")
-"""Names of the two values that `RigidMap.ground_after_push` returns: ground reactions during and after a push."""
+"""Names of the values that `RigidMap.ground_after_push` returns: ground reactions during and after a push."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 INDICATOR_UNITS: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
@@ -121,7 +121,7 @@ def run(
         assert numbers is not None, "a gait has quantities"
         answer["gaits"].append({"model": subject.model, **numbers})
         answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
-        # Walks leave an unstable gait whatever the disturbance.
+        # An unstable gait survives no disturbance.
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
@@ -131,7 +131,7 @@ def run(
         label = f"robustness: {subject.model} model"
         units = [*single_disturbance_units(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
-        # The computation of the gait's quantities has already compiled all kernels.
+        # All kernels are compiled, because the quantities of the gait have been computed.
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         target = {"steps": config.robustness.steps}
         for each in gaits:
@@ -191,7 +191,7 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
 
 
 def row_of(subject: ModelUnderTest, gait: GaitOnMap) -> dict[str, Any]:
-    """Return the start of a row: the model and, if the legs differ, the leg that swings in the disturbed step."""
+    """Return the first cells of a row: the model and, if the legs differ, the leg that swings in the disturbed step."""
     return {"model": subject.model} | ({"leg": gait.leg} if gait.step_map.stride > 1 else {})
 
 
@@ -253,7 +253,7 @@ def cap(model: str, config: RobustnessConfig) -> int:
 
 
 def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
-    """Count the steps of each walk on its own rough ground, which depends only on the seed and the walk's number."""
+    """Count the steps of each walk. Its ground depends only on the seed and the number of the walk."""
     gait, *_ = subject.quick_by_leg()
     return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 

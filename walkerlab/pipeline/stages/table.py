@@ -1,4 +1,4 @@
-"""The package's own stages, divided into walks and questions, each with its part of the config, options and inputs.
+"""Built-in stages, divided into walks and questions. Each declares its part of the config, its options and inputs.
 
 The command line builds its help from this file, so the file imports no stage, no config schema and no NumPy.
 """

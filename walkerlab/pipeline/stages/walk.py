@@ -1,8 +1,8 @@
 """Parts shared by the stages that compute walks: start, stored groups, summary and numerical error.
 
 Both models store a walk with the same names, shapes and meanings. Quantities that a model lacks are absent. Long walks
-are thinned: all samples of the first and last steps are stored, fewer of the others. The
-numerical error is the change of a walk's quantities at tighter tolerances.
+are thinned: all samples of the first and last steps are stored, fewer of the others. The numerical error is the change
+of a walk's quantities at tighter tolerances.
 """
 
 import math
@@ -27,12 +27,12 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store.content import UNEVEN, Content, Group, Variable, labelled, numbered
 from walkerlab.scene.rigid import first_step_length, have_different_legs
 
-LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
+MIN_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
-MORE_WORK: Final = 10  # factor on the evaluation budget at tighter tolerances
+BUDGET_FACTOR: Final = 10  # the evaluation budget is multiplied by this at tighter tolerances
 SAMPLE: Final = 16  # maximum number of walks to repeat
 DEFAULT_TIGHTENING: Final = TIGHTER[100.0]
-ROUNDING: Final = 1e-6  # relative rounding error allowed in a divided tolerance
+ROUNDING: Final = 1e-6  # relative difference from a divided tolerance that counts as rounding
 
 Summary = Mapping[str, Any]
 Values = Sequence[float | None]
@@ -46,7 +46,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
     walk        repeats the walk with other tolerances and returns its summary
 
     Returns the largest change of each step quantity, named as in `ERROR_OF_EACH_STEP`, the change of `end_time_s` (s)
-    and, for a driven walk, the change of `cost_of_transport`; `of_steps` has the largest changes up to each step. `by`
+    and, for a driven walk, the change of `cost_of_transport`. `of_steps` has the largest changes up to each step. `by`
     describes the tighter settings unless they are the usual ones. If the two walks end differently, only `reason` is
     returned.
     """
@@ -55,11 +55,11 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances, or another method if they cannot be tightened, with more budget and a description."""
-    tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
+    """Return tighter tolerances with more budget, or another method if they cannot be tightened, and a description."""
+    tolerances = replace(tolerances, budget=min(BUDGET_FACTOR * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
-        if rtol >= (1.0 - ROUNDING) * LEAST_RTOL:
+        if rtol >= (1.0 - ROUNDING) * MIN_RTOL:
             return replace(tolerances, rtol=rtol, atol=tolerances.atol / factor), by
     method = "dop853" if tolerances.method == "radau5" else "radau5"
     return replace(tolerances, method=method), f"another method, {method}"
@@ -75,7 +75,7 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
     later = steps_later(first, second)
     for key, name in ERROR_OF_EACH_STEP.items():
         apart = step_changes(first.get(key) or (), second.get(key) or (), first.get("repeats_after") or 0, later)
-        if np.isfinite(apart).any() and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
+        if np.isfinite(apart).any() and any(first[key]):  # zeros of point feet
             changes[name] = float(np.nanmax(apart))
             of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
     changes["end_time_s"] = abs(first["end_time_s"] - second["end_time_s"])
@@ -87,7 +87,7 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
 
 
 def steps_later(first: Summary, second: Summary) -> int | None:
-    """Return how many steps later the second walk takes the steps of the first one's cycle, or None without cycles."""
+    """Return by how many steps the cycle of the second walk lags behind that of the first, or None without a cycle."""
     period = first.get("repeats_after") or 0
     if not period or second.get("repeats_after") != period:
         return None
@@ -105,7 +105,7 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
     with the same steps of the cycle, even if these come later. If the second walk has not settled yet, the error of
     the cycle is estimated by that of one step.
     """
-    # A list of slips lacks the last step if its foot has not lifted.
+    # The lists may differ in length: slips lack the last step if its foot has not lifted.
     count = min(len(first), len(second))
     values, others = (np.array(each[:count], float) for each in (first, second))
     changes = np.abs(values - others)
@@ -137,7 +137,7 @@ MAX_REPEATED = 32
 FEWEST_SETTLED = 8
 """Repetition is looked for in at least this many of the last steps."""
 REPEATED = 1e-5
-"""Steps repeat if they differ by less than this, relative to the first step."""
+"""Steps repeat if they differ by less than this, as a fraction of the first step."""
 REPEATED_AFTER_SETTLING = 1e-2
 """If steps repeat only after two or more, they must also differ by less than this, relative to the spread of the steps.
 """
@@ -163,8 +163,8 @@ STEP_LABELS: Final = {
     "state_before": Label("rad, rad/s", "state just before the touch", (COORDINATE,)),
     "state_after": Label("rad, rad/s", "state just after the touch, roles exchanged", (COORDINATE,)),
 }
-# missing where a knee does not lock or the last stance foot does not lift
-WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
+# Columns with missing values where a knee does not lock or the last stance foot does not lift.
+INCOMPLETE_COLUMNS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
 TIME_LABELS: Final = {
     "time": Label("s", "time"),
     "step": Label("1", "step number"),
@@ -184,7 +184,7 @@ TIME_LABELS: Final = {
     "kinetic_J": Label("J", "kinetic energy"),
     "potential_J": Label("J", "potential energy, which is zero at the step's foothold"),
     "mechanical_J": Label("J", "kinetic, potential (zero at the step's foothold) and elastic energy"),
-    "total_energy_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
+    "total_energy_J": Label("J", "kinetic, potential (zero at a fixed origin) and elastic energy"),
     **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
     "push_off_J": Label("J", "cumulative energy supplied by the push-off"),
     "hip_J": Label("J", "cumulative energy supplied by the hip's torque and damper"),
@@ -297,21 +297,19 @@ def rotation_variables(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict
 
 
 def leg_labels() -> dict[str, Variable]:
-    """Build the coordinate of the legs. Each leg keeps its number, 1 or 2, whether it swings or stands."""
+    """Build the coordinate of the legs. A leg has the same number, 1 or 2, in swing and in stance."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `STEP_LABELS`. NaN and values that the last steps lack are stored as
-    missing.
-    """
+    """Build variables over steps, named as in `STEP_LABELS`. NaN and the ends of short lists become missing values."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
     columns = numbered(count, STEP, "step number")
     for name, column in {"touch_time_s": touch_time_s, **values}.items():
         if column is not None:
-            gaps = name in WITH_GAPS
+            gaps = name in INCOMPLETE_COLUMNS
             rows = np.append(column, np.full(count - np.size(column), np.nan)) if gaps else column
             columns[name] = labelled(rows, STEP_LABELS[name], STEP, gaps=gaps)
     return columns
@@ -338,9 +336,7 @@ def measure_pace(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict
 
 
 def drive_measures(walk: WalkRecord) -> dict[str, Any]:
-    """Return the work of each drive per step and the cost of transport, or nothing for a walk that covers
-    no distance.
-    """
+    """Return the work of each drive per step and the cost of transport, or nothing if the walk gets nowhere."""
     distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
     if distance <= 0.0:
         return {}
@@ -386,7 +382,7 @@ def steps_to_repeat(steps: Floats) -> int:
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         difference = np.abs(steps[period:] - steps[:-period]).max()
-        # A walk that settles slowly, alternating about its limit, almost repeats after two steps.
+        # A walk that settles slowly, alternating about its limit, almost repeats after two steps without being a cycle.
         if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0

@@ -17,9 +17,9 @@ from walkerlab.pipeline.store.files import file_digest, read_bounded, refuse_ful
 from walkerlab.pipeline.store.provenance import Provenance
 
 SCHEMA_VERSION = 3
-"""Version of the artifacts' layout."""
+"""Version of the layout of artifacts."""
 READABLE: Final = (2, SCHEMA_VERSION)
-"""Versions of the layout that can be read; in version 2 text has variable length."""
+"""Versions of the layout that can be read. In version 2, text has variable length."""
 DIGEST: Final = re.compile("[0-9a-f]{64}")
 
 
@@ -74,7 +74,7 @@ NOT_THERE = "not there yet"
 """Reason for running a stage without a stored result."""
 
 LIMIT_BYTES = 1 << 30
-"""Maximum size of an artifact; larger files are not read."""
+"""Maximum size of an artifact. Larger files are not read."""
 
 # The seal follows the HDF5 data. It reveals damaged files before the HDF5 library reads them, because some of them make
 # the library free memory twice.
@@ -87,7 +87,7 @@ NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""Attributes at the root of every artifact; content with arrays at the root may add others."""
+"""Attributes at the root of every artifact. Content with arrays at the root may add others."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
@@ -100,7 +100,7 @@ class OtherLayout(Damaged):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Identified(Content):
-    """Content of a result, stored or not, with its identity."""
+    """Content of a result and its identity."""
 
     identity: Identity
 
@@ -115,10 +115,10 @@ class Stored(Identified):
 
 @dataclass(frozen=True)
 class Lookup:
-    """Whether a file is the artifact with a given key, and why not."""
+    """Whether a file is the artifact with a given key, and the reason if it is not."""
 
     accepted: bool
-    reason: str  # reason for rejecting it; empty if accepted
+    reason: str  # reason for rejecting the file; empty if it is accepted
     artifact: Stored | None = None  # the artifact as read, even if its key differs; None if missing or damaged
     damaged: bool = False  # whether the file exists but cannot be trusted
 
@@ -244,7 +244,7 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
 
     Raises Damaged if its digest or key does not match.
     """
-    # The version comes before everything else, because other layouts need not have the other attributes.
+    # The version is checked first, because other layouts may lack the other attributes.
     if root.get("schema_version") not in READABLE:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     attributes = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
@@ -290,7 +290,7 @@ def index_files(folder: Path, files: Iterable[Path]) -> Group:
 
 
 def indexed_files(content: Content) -> dict[str, str]:
-    """Return the digest of each listed file, by path in the run folder. It is empty if the content has no list."""
+    """Return the digest of each listed file by path in the run folder, or nothing if the content has no list."""
     group = content.groups.get(FILES_GROUP)
     return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
 

@@ -15,10 +15,8 @@ SHIPPED = ("walkerlab", "configs")
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, with '-dirty' if its package files changed, or None outside a git
-    checkout.
-    """
-    # look only at the package's own repository: its environment may lie inside another checkout
+    """Return the commit of a source tree, with '-dirty' if package files have changed, or None outside a checkout."""
+    # Without this check, git would report the commit of another checkout that contains the environment.
     if not (root / ".git").exists():
         return None
     commit = git(root, "rev-parse", "HEAD")

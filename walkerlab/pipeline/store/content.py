@@ -35,11 +35,11 @@ class Variable:
     """
 
     values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
-    # name of each axis; a variable with the name of its only dimension is the coordinate of that dimension
+    # Name of each axis. A variable with the name of its only dimension is the coordinate of that dimension.
     dims: tuple[str, ...]
     units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text
     long_name: str  # meaning, as shown on axes and in tables
-    timing: bool = False  # whether the values depend on run times; they are stored, but the digest omits them
+    timing: bool = False  # whether the values depend on run times; the digest omits such values
     missing: bool = False  # whether NaN is allowed, to mark missing values
 
     def __post_init__(self) -> None:
@@ -104,12 +104,12 @@ class Content:
     Raises ValueError or TypeError for a summary that is not JSON or holds non-finite numbers, and for clashing names.
     """
 
-    # groups by path, such as 'corrected/gaits' ('' for the file's root); missing parent groups are added
+    # Groups by path, such as 'corrected/gaits' ('' for the root of the file). Missing parent groups are added.
     groups: Mapping[str, Group] = field(default_factory=dict)
-    # values that `--json` prints, in SI units; 'wall_s' and keys that end in '_wall_s' count as timings
+    # Values that `--json` prints, in SI units. 'wall_s' and keys that end in '_wall_s' count as timings.
     summary: Mapping[str, Any] = field(default_factory=dict)
     timed: tuple[str, ...] = ()  # further top-level keys of the summary that depend on timings, such as 'best'
-    # False for the partial results of a stage that found no answer; the summary's `no_answer` gives the reason
+    # False for the partial results of a stage that found no answer. The reason is under `no_answer` in the summary.
     complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -292,11 +292,11 @@ def rows_group(rows: Sequence[Any], labels: Mapping[str, Label], dim: str = "row
 Array = NDArray[np.float64]
 
 UNEVEN = "foothold_height_m"  # name of the variable with the foothold heights, stored only on uneven ground
-FAR_EDGE_M = 1e6  # m; the first level begins this far behind the first foothold, outside any drawing
+FAR_EDGE_M = 1e6  # m; the first level begins this far behind the first foothold, so that it fills any drawing
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Return where each ground level begins along the slope, and its height (m). Levels meet midway between footholds.
+    """Return where each ground level begins along the slope, and the height (m). Levels meet midway between footholds.
 
     steps  stored group of the walk's steps
 

@@ -1,7 +1,7 @@
 """Files: atomic writing, errors of the file system, CSV that is safe to open in a spreadsheet, and checkpoints.
 
 A checkpoint is a journal next to the artifact, from which an interrupted run resumes: first the key of the result, then
-a line for each unit of work, each with a checksum. Lines are only appended; an incomplete last line is dropped.
+a line for each unit of work, each with a checksum. Lines are only appended. An incomplete last line is dropped.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ from typing import Any
 from walkerlab.errors import StorageError
 
 TEMPORARY = ".*.tmp"
-"""Pattern of temporary files; a process that holds the run folder's lock may remove all that it finds."""
+"""Pattern of temporary files. A process that holds the lock of the run folder may remove all of them."""
 
 ADVICE = {
     errno.ENOSPC: "Free some space, or choose another folder with --runs.",
@@ -114,7 +114,7 @@ def write_through(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a `with` block a temporary file that replaces `path` at its end. After a failure `path` is unchanged.
+    """Lend a `with` block a temporary file that replaces `path` at the end. After a failure `path` is unchanged.
 
     Raises StorageError if the file cannot be written.
     """
@@ -128,7 +128,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.replace(path)
         finally:
-            # The temporary file remains after a failure, or if it was a hard link to `path` itself.
+            # The temporary file is still there after a failure, or if it was a hard link to `path` itself.
             with contextlib.suppress(OSError):
                 temporary.unlink()
         if hasattr(os, "O_DIRECTORY"):  # other systems cannot flush a folder's entries
@@ -140,7 +140,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the disk has no room for `size` bytes, which is tried with a temporary file."""
+    """Try a temporary file of `size` bytes, and raise OSError if the disk has no room for it."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -171,7 +171,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # `read` allocates memory for the requested size, so it gets the actual size and not the limit.
+        # `read` allocates memory for the requested size, so it must not be the limit.
         return file.read(status.st_size)
 
 
@@ -211,7 +211,7 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 def csv_cell(value: Any) -> Any:
     """Convert a value to a CSV cell. Text that a spreadsheet would evaluate gets a leading apostrophe."""
-    # -1.5 is harmless, although it begins like a formula.
+    # Numbers such as -1.5 begin like a formula, but are harmless.
     if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
         return f"'{value}"
     return "" if value is None else value
@@ -253,7 +253,7 @@ class Checkpoint:
         if self.path is None:
             return
         with storing(self.path), self.path.open("r+b" if self._intact else "wb") as file:
-            # An earlier process may have been killed while it wrote its last line.
+            # An earlier process that was killed may have left an incomplete line.
             file.truncate(self._intact)
             file.seek(self._intact)
             if not self._intact:

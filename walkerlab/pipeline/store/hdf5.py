@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.store.content import Attribute, Group, Variable
 
-# Text by which netCDF readers recognise a dimension without a coordinate; the length follows it.
+# Text by which netCDF readers recognise a dimension without a coordinate. The length is appended.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""
 ENCODING = "_Encoding"
 """Attribute by which xarray decodes text."""
 MIN_TEXT_BYTES = 2
-"""Minimum length of text in arrays; netCDF readers join texts of one byte along the last dimension."""
+"""Minimum length of text in arrays. Texts of one byte would be joined by netCDF readers along the last dimension."""
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
-LEAST_BYTES = 32
-"""Minimum size of a group's member in a file; it limits the number of members, even with circular links."""
+MIN_MEMBER_BYTES = 32
+"""Each member of a group takes at least this many bytes. So the size of a file bounds the number of its members, even
+if links are circular.
+"""
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
@@ -130,7 +132,7 @@ def stored_bytes(values: NDArray[Any]) -> int:
 
 def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
     """Encode an array of strings as UTF-8 of one length, padded with NUL."""
-    # Not marked as UTF-8, because Octave loads only text that is marked as ASCII, and stops at any other.
+    # The type is not marked as UTF-8, because Octave stops at any text that is not marked as ASCII.
     texts = [text.encode() for text in values.ravel().tolist()]
     return np.array(texts, f"S{text_bytes(values)}").reshape(values.shape)
 
@@ -149,14 +151,14 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
     """Parse the groups, by path, and the root attributes of an untrusted HDF5 file.
 
     Data that declare more than the file can hold are not read. Raises ValueError for them and for content that `image`
-    cannot write, and the HDF5 library's own errors.
+    cannot write, and the errors of the HDF5 library.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
         return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)
 
 
 class Budget:
-    """Number of bytes that the datasets not yet read may declare. A file may not declare more than it holds."""
+    """Number of bytes that the remaining datasets may declare, since a file cannot hold more data than its size."""
 
     def __init__(self, size: int) -> None:
         """Set the budget to the size of the file, in bytes."""
@@ -179,7 +181,7 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
     variables: dict[str, Variable] = {}
     members: dict[str, Any] = {}
     for name in sorted(parent):
-        budget.spend(LEAST_BYTES)
+        budget.spend(MIN_MEMBER_BYTES)
         if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"it holds a link, {name!r}")
         members[name] = parent[name]
@@ -200,7 +202,7 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Map members' addresses to their names, since HDF5 would search the whole file for the name of a scale."""
+    """Return names by address in the file. HDF5 itself would search the whole file for the name of a scale."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
@@ -243,7 +245,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     if h5py.check_string_dtype(dataset.dtype).length is None:
         return read_variable_strings(dataset, budget)
     texts = np.asarray(dataset[()])
-    # Equal strings share one object, because a short string takes far more memory than in the file.
+    # Equal strings share one object, because a short string takes far more memory here than in the file.
     decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
     values = np.empty(texts.shape, dtype=object)
     values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]

@@ -68,7 +68,7 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
 def command_line() -> str:
     """Return the command line of this process."""
     program = Path(sys.argv[0]).name
-    # Under `python -m walkerlab`, the program has the name of its file.
+    # Under `python -m walkerlab`, the program is called __main__.py.
     return shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])])
 
 

@@ -37,7 +37,7 @@ RECORD_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Record:
-    """Name and config of a folder's run. Results that were taken over from another run hold that run's config."""
+    """Name and config of a run. They are recorded because results taken over from another run hold its config."""
 
     run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`
@@ -70,7 +70,7 @@ class RunFolder:
     @classmethod
     def open_folder(cls, path: Path) -> "RunFolder":
         """Return the run in a folder, with its recorded source and changes."""
-        # Only a resolved path has the folder's name.
+        # Paths such as `.` do not show the name of the folder until they are resolved.
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()
         if record is None:
@@ -127,7 +127,7 @@ class RunFolder:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):
             return None
-        # Imported here, because it is not needed for a folder without this file, which is not locked.
+        # Imported late: most folders lack this file and are not locked.
         from filelock import FileLock, Timeout
 
         # A killed process leaves its file, but not its lock.
@@ -141,7 +141,8 @@ class RunFolder:
 
         Creates the folder if needed and removes leftovers of killed writers.
 
-        wait  whether to wait for another process; `say` is then called with a message
+        wait  whether to wait for another process
+        say   called with a message before waiting
 
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
         the lock file cannot be created.
@@ -189,7 +190,7 @@ SHOWN_CHANGES = 3
 
 
 def config_text(folder: RunFolder) -> str | None:
-    """Return the resolved config of a run as YAML, or None if neither its record nor a readable result contains it."""
+    """Return the resolved config of a run as YAML, from its record or a readable result, or None if neither has it."""
     record = folder.record()
     if record is not None:
         return record.config
@@ -261,7 +262,7 @@ def claim(folder: RunFolder, config: Config) -> None:
     refuse_another_config(folder, config)
     record = folder.record()
     new_record = Record(folder.name, folder.source, to_yaml(config), folder.changes)
-    if record is None or (comes_from(record, folder) and record != new_record):
+    if record is None or (is_of_same_config_file(record, folder) and record != new_record):
         folder.write_record(new_record)
 
 
@@ -271,7 +272,7 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
     The name and the `sweep` block are not compared, since no result depends on them.
     """
     record = folder.record()
-    if (record is not None and comes_from(record, folder)) or not any(folder.path.glob("*.h5")):
+    if (record is not None and is_of_same_config_file(record, folder)) or not any(folder.path.glob("*.h5")):
         return
     recorded = config_of(folder)
     if recorded is None and record is None:  # nothing in the folder can be read
@@ -291,13 +292,13 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
         )
 
 
-def comes_from(record: Record, folder: RunFolder) -> bool:
-    """Whether a folder's results come from the same config file and run name, even if the file was edited since."""
+def is_of_same_config_file(record: Record, folder: RunFolder) -> bool:
+    """Whether the results of a folder have the same config file and run name. The file may have been edited since."""
     return (record.run, record.source) == (folder.name, folder.source)
 
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
-"""Patterns of the files that drawing stages write, needed if their index is lost."""
+"""Patterns of the files that drawing stages write. They are needed only if the index of the files is lost."""
 CHUNKS = "sweep-chunks"
 FIGURES_FOLDER = "figures"
 UNFINISHED = (TEMPORARY, f"{FIGURES_FOLDER}/{TEMPORARY}", f"{CHUNKS}/{TEMPORARY}")
@@ -315,13 +316,13 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
         files |= {folder.artifact(stage), folder.checkpoint(stage)}
         with contextlib.suppress(OSError, Damaged):
             listed = indexed_files(read(folder.artifact(stage)))
-            # A list in a file from somebody else could name files outside the folder.
+            # A file from somebody else could list files outside the folder, and `clean` would remove them.
             files |= {folder.path / name for name in listed if (inside / name).resolve().is_relative_to(inside)}
     return sorted(path for path in files if path.is_file() or path.is_symlink())
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run that a result, drawing or record belongs to, or None for the user's own files."""
+    """Return the run that a result, drawing or record belongs to, or None for other files, which are the user's."""
     resolved = path.resolve()
     # Results are in the run's folder, and drawings in a folder below it.
     for place in (resolved.parent, resolved.parent.parent):

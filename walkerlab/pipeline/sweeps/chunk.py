@@ -29,7 +29,7 @@ Labels = Mapping[str, tuple[str, str]]
 
 OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of caches of stage inputs (see `input_cache`) that a process keeps."""
+"""Number of caches of stage inputs that a process keeps, see `input_cache`."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -45,7 +45,7 @@ class PointResult:
     numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
     wall_s: Annotated[float, Label("s", "computation time", timing=True)] = 0.0
     bug: str = ""
-    """Traceback of a bug that stopped the computation; empty if there was none."""
+    """Traceback of a bug that stopped the computation, or '' if there was none."""
 
 
 @dataclass(frozen=True)
@@ -58,19 +58,17 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def input_cache(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
-    """Return the cache of stage inputs of this process, which is kept between chunks. Arguments are as in
-    `compute_point`.
-    """
+    """Return this process's cache of stage inputs, which outlives a chunk. Arguments are as in `compute_point`."""
     return MemoryResults(graph)
 
 
 def compute_point(
     config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "", expected: str | None = None
 ) -> Chunk:
-    """Compute one point in this process. An error becomes its result.
+    """Compute one point in this process. If that fails, the result contains the error.
 
     key       stage key of the point's result
-    again     whether to repeat its walk to measure the numerical error
+    again     whether to repeat the walk of the point to measure the numerical error
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
     expected  the caller's `versions` of extensions, which must be those of this process; None not to compare them
     """
@@ -155,13 +153,13 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 
     Raises StorageError if that fails.
     """
-    # A point that failed is tried again in the next run.
+    # Failed points are not stored, so that the next run tries them again.
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
     points = rows_group(rows, labels_of(PointResult), "point", "point of the chunk")
     content = Content({"points": points}, {"labels": {name: list(label) for name, label in chunk.labels.items()}})
-    # Chunks of equal points have the same name, so a repeated one replaces the old file.
+    # Chunks of the same points have the same name, so that a repeated chunk replaces the old file.
     inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
     name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
@@ -175,7 +173,7 @@ def stored_chunks(
 ) -> Iterator[Chunk]:
     """Iterate over a stage's results that the present code has computed and stored, in all run folders.
 
-    keys  stage keys of the sweep; chunks are all included, results of single runs only if their keys match
+    keys  stage keys of the sweep. Results of single runs are included only if their keys match, chunks always
     warn  called with a message about each damaged chunk
     """
     for path in sorted(runs_dir.glob(f"*/{CHUNKS}/{stage}-{code_digest[:8]}-*.h5")):

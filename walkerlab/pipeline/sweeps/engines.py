@@ -27,9 +27,9 @@ LISTING_S: Final = 5.0
 RESULT_S: Final = 30.0
 """Time after a job's end in which its result may still appear on a network disk."""
 RESTART_S: Final = 20.0
-"""Time without a Dask worker after which workers are started again; Dask itself needs some seconds to replace one."""
+"""Time without a worker after which workers are started again. Dask itself needs some seconds to replace one."""
 SILENT_WORKER_S: Final = 600.0
-"""Time without an answer of Slurm's queue after which its jobs are taken for lost."""
+"""If Slurm's queue has not answered for this time, its jobs count as lost."""
 GONE = "gone"
 SILENT = "silent"
 ENDED_STATES: Final = {
@@ -80,7 +80,7 @@ def local(options: EngineOptions) -> WorkerPool:
 
 @contextlib.contextmanager
 def environment_of_workers() -> Iterator[None]:
-    """Let processes that start in the `with` block use one thread, and import nothing from the current folder."""
+    """Make processes that start in the `with` block use one thread and import nothing from the current folder."""
     changes = dict.fromkeys((*ONE_THREAD, "PYTHONSAFEPATH"), "1")
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
@@ -114,8 +114,8 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
             workers = DaskWorkers(cluster, client, count)
-        # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
-        # result whose worker dies before handing it over.
+        # Dask's own executor reports an error if a worker dies before it hands over a result. Here such a chunk is
+        # computed again, as in every engine.
         size = options.workers or max(1, len(client.nthreads()))
         # By default Dask gives equal calls the same result, so a second attempt would get that of the first.
         executor = JobExecutor(
@@ -166,7 +166,7 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
             private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
         )
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
-    # submitit asserts the types of options.
+    # submitit checks the types of options by assertions.
     except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
@@ -205,16 +205,14 @@ def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
 
 
 class SlurmQueue:
-    """States of this user's Slurm jobs, from the queue, because submitit asks only the accounting, which few clusters
-    keep.
-    """
+    """States of this user's Slurm jobs, from the queue. submitit asks only the accounting, which few clusters keep."""
 
     def __init__(self, time_limit: str) -> None:
-        """Send no query yet. `time_limit` is that of the jobs (min)."""
+        """Remember the time limit of the jobs (min). Slurm is first queried when a state is needed."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
-        # The first query is sent at once.
+        # The time is shifted so that the first call of `state` queries Slurm without waiting.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:
@@ -352,7 +350,7 @@ def parse_engine(text: str) -> tuple[SweepEngine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: unknown engine; choose from {', '.join(ENGINES)}.")
-    # This is multiprocessing's own test for a process that it started. Such a process first runs the calling script.
+    # multiprocessing marks the processes that it starts in this way. They first run the calling script.
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep again.", GUARD

@@ -201,7 +201,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def convert_for_key(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to int if the key takes integers. The schema rejects other numbers."""
+    """Convert whole numbers to int if the key takes integers. Other numbers are kept, and the schema rejects them."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -261,7 +261,7 @@ def described(config: Config, key: str) -> tuple[str, str]:
     """Return the unit of a key under a config (units may depend on it), and the meaning of the key."""
     *above, last = key.split(".")
     block = value_at(config, above)
-    # A config's block may be of another type than the schema's default, with other keys.
+    # The block may be of another type than the schema's default, and so have other keys.
     field = key_fields().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key

@@ -32,7 +32,7 @@ STATUS_TEXTS: Final = {
 """Columns that every point has in addition to the stage's quantities."""
 STATE_NAMES: Final = ("state", "start_state", "final_state")
 MAX_REASON: Final = 500
-"""Maximum length of a reason; all points have room for the longest, since text in files has a fixed length."""
+"""Maximum length of a reason. Text in files has a fixed length, so one long reason makes room for it at all points."""
 
 
 class SweepVariable:
@@ -47,7 +47,7 @@ class SweepVariable:
     def put(self, places: Integers, values: Sequence[Any]) -> None:
         """Store values at these indices. The column grows if a value has a larger shape."""
         if self.text:
-            # equal strings share one object, to save memory
+            # Equal strings share one object to save memory.
             self.values[places] = [sys.intern(value) for value in values]
             return
         try:
@@ -58,7 +58,7 @@ class SweepVariable:
             return
         if array.ndim != self.values.ndim:
             return  # a list where other points have a number cannot be stored
-        # NumPy also makes integers of switches and counts in one list.
+        # NumPy makes integers of a list that mixes switches and counts, so the types are read from the list itself.
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
         shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
         if shape != self.values.shape[1:]:
@@ -132,7 +132,7 @@ class Merge:
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
     def values_of(self, name: str) -> NDArray[Any] | None:
-        """Return a quantity's values at the points, with NaN or '' for gaps, or None if no point has the quantity."""
+        """Return a quantity at the points, with NaN or '' where it is missing, or None if no point has it."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> InTurn:
@@ -161,9 +161,7 @@ class Merge:
         return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe the endings of the walks and the role of the ground, or return nothing for a stage that does not
-        walk.
-        """
+        """Describe how walks ended and the role of the ground, or return nothing for a stage that simulates no walk."""
         question = self.question
         config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
@@ -172,7 +170,7 @@ class Merge:
         off = outcomes == "off-pad"
         lengths = self.values_of("step_lengths_m")
         if pitch is not None and off.any():
-            last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
+            last = np.zeros(0) if lengths is None else last_numbers(lengths[off])
             steps = last[np.isfinite(last)]
             varied = PAD_PITCH in (axis.key for axis in question.axes)
             laid = "" if config.contact is None or varied else config.contact.pad_pitch
@@ -193,7 +191,7 @@ class Merge:
         return {"numerical_error": counts | largest}
 
     def variable(self, name: str) -> Variable:
-        """Remove and return a variable over the points. Without the removal two copies would exist."""
+        """Return a variable over the points, and remove its column, because a second copy would take much memory."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]
@@ -214,8 +212,8 @@ class Merge:
         return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 
 
-def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the last number of each row (..., numbers), ignoring trailing gaps, or NaN for an empty row."""
+def last_numbers(rows: NDArray[Any]) -> NDArray[Any]:
+    """Return the last number of each row (..., numbers) that is not NaN, or NaN for an empty row."""
     counts = np.isfinite(rows).sum(axis=-1, keepdims=True)
     last = np.take_along_axis(rows, np.maximum(counts - 1, 0), axis=-1)
     return np.asarray(np.where(counts > 0, last, np.nan)[..., 0])
@@ -267,5 +265,5 @@ def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tup
     for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)
-        # Only NaN differs from itself.
+        # NaN is the only value that differs from itself.
         yield f"{name}{ending}", ["" if value != value else value for value in column]

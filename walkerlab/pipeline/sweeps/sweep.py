@@ -44,7 +44,7 @@ class SweepWork:
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
-    # called after each chunk with an answer, with the names of all quantities so far; may raise an error
+    # Called with the names of all quantities so far, after each chunk with an answer. It may raise an error.
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
@@ -115,7 +115,7 @@ class SweepRun:
         unique, self.inverse = np.unique(keys, return_inverse=True)
         # NumPy drops zero bytes at the end of a byte string.
         self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
-        # index of the first point with each key
+        # By key: index of the first point that has it.
         self.first = np.full(len(unique), len(keys))
         # `minimum.at` also counts repeated indices, unlike an assignment to them.
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
@@ -210,7 +210,7 @@ class SweepRun:
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
-                place = bug.rpartition("\n  ")[0]  # leave out the message, which differs from point to point
+                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
                 if place not in bugs:
                     reporter.warn(f"a bug stopped one point of the sweep; the others continue.\n{bug}")
                     bugs[place] = bug
@@ -231,7 +231,7 @@ class SweepRun:
         """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
         stage = self.question.stage
         graph = self.keys.graph
-        # Workers keep inputs between chunks. The token keeps those of earlier sweeps out of a forced one.
+        # Workers keep inputs between chunks. With a new token, a forced sweep does not reuse those of earlier sweeps.
         forced = token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
-from walkerlab.extensions import declared, load
+from walkerlab.extensions import code_by_word, load
 from walkerlab.labels import add_unit, join_words
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.planner import Planner, command, refusing_older, results_in, results_to_show, the_result
@@ -272,7 +272,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
         )
     rows = summary[TABLES[name]]
     if kind == "tex":
-        tex_table: Table = load(declared("tables")["compare"])(TABLES[name], rows)
+        tex_table: Table = load(code_by_word("tables")["compare"])(TABLES[name], rows)
         return tex_table
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]

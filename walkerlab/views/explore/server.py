@@ -238,7 +238,7 @@ class Desk:
 
     def close(self) -> None:
         self.worker.process.kill()
-        self.worker.ended()
+        self.worker.wait_for_end()
 
 
 class Server(ThreadingHTTPServer):

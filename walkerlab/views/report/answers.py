@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import escape
 
-from walkerlab.extensions import declared, lazy_function
+from walkerlab.extensions import code_by_word, lazy_function
 from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.report import gaits
@@ -326,7 +326,7 @@ ANSWERS: dict[str, Answer] = {
     "engines": engines,
     "plot": plot,
     "report": report,
-    **{stage: lazy_function(code) for stage, code in declared("answers").items()},
+    **{stage: lazy_function(code) for stage, code in code_by_word("answers").items()},
 }
 
 
