@@ -9,7 +9,7 @@ from latex import compile_tables
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks import accuracy, trials
+from walkerlab.evidence.benchmarks import accuracy, references
 from walkerlab.evidence.benchmarks.trials import ContactTrial, RigidTrial
 from walkerlab.evidence.verification import known_problems, stability
 from walkerlab.evidence.verification.catalogue import package_cases
@@ -42,7 +42,7 @@ def run(tmp_path_factory):
             patch.setattr(trial, "methods", property(lambda self: ("dop853", "radau5")))
         patch.setattr(accuracy, "OWN_LADDER", (1e-3, 1e-6))
         patch.setattr(accuracy, "MAX_REPEATS", 1)
-        patch.setattr(trials, "TIGHTEST_CONTACT", {"dop853": 1e-8, "radau5": 1e-9})
+        patch.setattr(references, "TIGHTEST_CONTACT", {"dop853": 1e-8, "radau5": 1e-9})
         few = {name: (3, *setting) for name, (_, *setting) in rigid_limit.SERIES_SETTINGS.items()}
         patch.setattr(rigid_limit, "SERIES_SETTINGS", few)
         patch.setattr(rigid_limit, "TIMED_WALKS", 1)
