@@ -461,7 +461,7 @@ def test_mujoco_model_of_a_gait_starts_on_that_gait(mujoco, tmp_path):
     assert mujoco.mj_getTotalmass(model) == pytest.approx(22.0, rel=1e-12)
 
 
-def test_mujoco_model_of_a_gait_finds_the_gait_of_changed_keys(mujoco):
+def test_mujoco_model_with_changed_keys_starts_in_the_new_gait(mujoco):
     gait = walkerlab.find_gait(slope_deg=2)
     _, data = walkerlab.mujoco_model(gait, slope_deg=3)
     steeper = walkerlab.find_gait(slope_deg=3)

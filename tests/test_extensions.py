@@ -447,7 +447,7 @@ FAULTS = {
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, friction={'icy': 'nowhere.law:Law'})"
     ),
     "it must name that code in quotes": "from walkerlab.config.schema import Config\nEXTENSION = 1",
-    "'json' is not the name of code": (
+    "'json' does not have the form module:name": (
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, figures='json')"
     ),
     "its sections must be at task, walks, evidence, benchmarks": (

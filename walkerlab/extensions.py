@@ -164,7 +164,7 @@ def check(extension: Any) -> None:
     for code in extension.code():
         module, _, name = code.partition(":")
         if not name or find_spec(module) is None:
-            raise ValueError(f"{code!r} is not the name of code, module:name, or the module does not exist")
+            raise ValueError(f"{code!r} does not have the form module:name, or its module does not exist")
 
 
 def extensions() -> dict[str, Extension]:

@@ -108,7 +108,7 @@ def test_slice_without_a_type_is_the_whole_config() -> None:
     assert restrict(CONFIG, None) is CONFIG
 
 
-def test_slice_with_an_unknown_key_is_a_bug() -> None:
+def test_unknown_key_in_a_slice_raises_an_internal_error() -> None:
     with pytest.raises(KeyError, match="slope_deg"):
         slice_of(CONFIG, MisspeltConfig)
     with pytest.raises(AttributeError, match="slope_deg"):

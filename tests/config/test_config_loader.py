@@ -380,7 +380,7 @@ def test_changing_the_inherited_type_lists_missing_keys(refused: Refused) -> Non
     assert "`-c round-feet`" in message
 
 
-def test_key_of_another_walker_type_lists_the_allowed_keys(refused: Refused) -> None:
+def test_error_for_a_key_of_another_walker_type_lists_the_allowed_keys(refused: Refused) -> None:
     message = refused("walker: {type: kneed, leg_length_m: 1.0}\n")
     assert "1:23: walker.type is kneed, which has no leg_length_m (of type compass); allowed: type, thigh" in message
     message = refused("extends: paper\n", ["walker.thigh.length_m=0.4"])

@@ -80,7 +80,7 @@ def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [-1.0, 0.1])
-def test_negative_residual_written_by_c3d_is_a_gap(scale, tmp_path):
+def test_negative_residual_in_a_file_from_c3d_is_read_as_a_gap(scale, tmp_path):
     """The file stores floating-point numbers or, with a positive scale, integers."""
     pytest.importorskip("ezc3d", reason="ezc3d, which reads C3D, is not installed")
     c3d = pytest.importorskip("c3d", reason="c3d is not installed")

@@ -157,7 +157,7 @@ def test_periods_alone_leave_two_parameters_undetermined():
     assert [estimate.standard_error for estimate in result.estimates] == [None, None]
 
 
-def test_outliers_do_not_change_noise_or_errors_of_a_soft_loss():
+def test_soft_loss_keeps_noise_and_standard_errors_small_despite_outliers():
     measured = MeasuredWalk(np.array(OUTLYING_PERIODS), np.array(OUTLYING_LENGTHS))
     linear, soft = (
         identify(measured, *WALKER, "slope_deg=2.05", fit={"slope_deg": None}, loss=loss)

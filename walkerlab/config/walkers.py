@@ -553,7 +553,7 @@ def why_no_push_off(walker: Any) -> str:
 
 
 def why_no_push_on(walker: Any) -> str:
-    """Explain why a leading leg like leg 1 cannot receive a push-off, or return '' if it can."""
+    """Explain why the trailing leg cannot push off while a leg like leg 1 leads, or return '' if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""

@@ -50,8 +50,8 @@ HIP_OF_LINES: Final = "upper marker along the walk"
 SAMPLE: Final = "sample"
 """Quantity: number of each sample in the file, counted from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
-CHANGED: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
-"""Pattern for a column with another sign, and a constant with its unit."""
+SIGN_AND_OFFSET: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
+"""Pattern for a column with an optional minus sign and an added constant, such as -NAME+90deg."""
 FRAME: Final = re.compile(r"(?i:frames?(?:[\s_]?(?:idx|index|number|no\.?))?#?)")
 """Pattern for the name of a column that counts frames."""
 PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
@@ -463,7 +463,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
         return ColumnSource(name)
     if quoted := QUOTED.fullmatch(text):
         return ColumnSource(named_column(recording, quoted[1]))
-    match = CHANGED.fullmatch(text)
+    match = SIGN_AND_OFFSET.fullmatch(text)
     if match is None or not (match[1] or match[3]):
         return ColumnSource(name)
     unit = value_in_si(match[4], kind) if match[4] else 0.0

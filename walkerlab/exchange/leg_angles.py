@@ -1,4 +1,6 @@
-"""Repairs of recorded leg angles before the search for heel strikes: turns, swapped legs, outliers, signs, ways back.
+"""Repairs of recorded leg angles before the search for heel strikes.
+
+They unwrap full turns, exchange swapped legs, drop outliers, correct signs, and keep one direction of walking.
 
 Each repair is listed in the doubts of the walk, with samples and times.
 """
@@ -131,10 +133,10 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
 
 
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
-    """Make angles positive with the foot ahead, and keep the longest stretch in one direction.
+    """Make angles positive with the foot ahead, and keep the longest stretch walked in one direction.
 
-    As the legs pass each other, the swing foot moves forwards relative to the hip, faster than the foot on the ground
-    moves backwards.
+    This direction is that of the faster foot as the legs pass each other: relative to the hip, the swing foot moves
+    forwards faster than the stance foot moves backwards.
     """
     angle = read_leg_angles(walk)
     swing = angle - np.mean(angle, axis=0)

@@ -101,7 +101,7 @@ class Strike:
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
 
     def best_with_strike(self) -> tuple[Stretch, float]:
-        """Return the stretch that minimises the squared residuals (rad^2) with the best strike, and the minimum."""
+        """Return the stretch with the smallest sum of squared residuals over all strike times, and that sum (rad^2)."""
 
         def left(at: float) -> float:
             parts = self.fit(at)
@@ -276,7 +276,7 @@ class Course:
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
-        """Return the course without the samples of passing stretches and without the offset of lasting ones."""
+        """Drop the samples of stretches that end. For those that last, subtract the offset from all later samples."""
         angle = self.angle.copy()
         kept = np.ones(self.rows.size, bool)
         for stretch in stretches:

@@ -224,7 +224,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
 
 
 def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
-    """Return angles (rad) and rates (rad/s) of both legs (samples, 2), of a polynomial through each step.
+    """Fit a polynomial to each step, and return its angles (rad) and rates (rad/s) of both legs, (samples, 2) each.
 
     Rates of a spline contain more noise, which would make kinetic energies too large.
     """

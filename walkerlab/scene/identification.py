@@ -259,7 +259,10 @@ def identify_beginning(
 
 
 def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
-    """Fit angles at their sample times, starting from the fit at equal phase. Return None for steps or a failed fit."""
+    """Fit angles at their sample times, starting from the fit at equal phase.
+
+    Return None if the data are a table of steps or if the fit fails.
+    """
     forecast = first.forecast
     u = first.u
     if not forecast.measured.sampled:

@@ -80,7 +80,7 @@ def test_new_stance_foot_is_at_rest_only_with_the_corrected_row():
 
 
 @pytest.mark.parametrize("row_2", [RIGHT, MISPRINTED])
-def test_gradient_of_the_foot_equals_its_difference(row_2):
+def test_foot_gradient_equals_finite_differences(row_2):
     walker, h = walker_of_the_paper(CORRECTED), 1e-6
     E = swing_foot_gradient(walker, 0.3, -0.2, row_2)
     by_1 = (swing_foot(walker, 0.3 + h, -0.2, row_2) - swing_foot(walker, 0.3 - h, -0.2, row_2)) / (2 * h)

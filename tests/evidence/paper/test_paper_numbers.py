@@ -298,7 +298,7 @@ def test_in_other_scenes_only_internal_contradictions_count_against_the_paper(ro
     assert {found[entry].verdict for entry in OWN_CONTRADICTIONS} == {Verdict.CONTRADICTED}
 
 
-def test_largest_printed_error_is_contradicted_for_any_model_result(rows):
+def test_small_model_errors_contradict_the_largest_printed_error(rows):
     small = WalkDifference(np.array([(9e-5, 1e-4)]), np.array([(1e-4, 1e-4)]))
     row = rows(errors={"raw": small, "aligned": small})[LARGEST_ERROR]
     assert (row.verdict, row.values["contact"]) == (Verdict.CONTRADICTED, 1e-4)

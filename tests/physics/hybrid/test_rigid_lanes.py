@@ -70,7 +70,7 @@ def test_ten_steps_end_at_the_reference_state(rtol, error):
 
 
 @pytest.mark.parametrize("walker", [ONE_DEGREE, STEEP, SMALL], ids=["paper", "steep", "small"])
-def test_random_starts_end_equally_in_lanes_and_in_single_walks(walker):
+def test_random_starts_end_the_same_way_in_lanes_as_in_single_walks(walker):
     starts = random_starts(walker, 200)
     fates, strikes = in_lanes(walker, starts, 1e-11)  # on the steep slope errors grow with every step
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)

@@ -124,7 +124,7 @@ def test_newton_residual_is_part_of_the_numerical_error():
     assert told["step_period_s"] > 1e-9
 
 
-def test_end_of_a_branch_by_the_walker_is_explained():
+def test_branch_that_ends_because_the_foot_slides_says_what_to_change():
     end = SimpleNamespace(value=5.0, reason="slid: the stance foot slides away")
     branch = SimpleNamespace(period=1, ends=(SimpleNamespace(value=0.2, reason="end of the span"), end), crossings=())
     followed = SimpleNamespace(model="contact", branches=(branch,))

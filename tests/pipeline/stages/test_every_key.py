@@ -173,7 +173,7 @@ def gradients_by(key, config, subject, known):
 
 
 def test_robustness_has_derivatives_for_every_parameter(walker, config, keys, subject, known):
-    read = set(robustness.numbers_read(subject))
+    read = set(robustness.parameters_read(subject))
     assert read <= set(keys)
     assert not any(key.startswith(ONLY_CONTACT) for key in read)
     for key in keys:

@@ -104,7 +104,7 @@ def test_labels_must_fit_the_values():
         Variable(np.zeros((2, 2)), ("x",), "m", "length")
     with pytest.raises(ValueError, match="dimensions"):
         Variable(np.zeros((2, 2)), ("x", "x"), "m", "length")
-    with pytest.raises(ValueError, match="others have"):
+    with pytest.raises(ValueError, match="other variables have"):
         Group({"a": metres([1.0]), "b": metres([1.0, 2.0])})
     with pytest.raises(ValueError, match="names both a dimension and a variable"):
         Group({"x": Variable(np.zeros((1, 2)), ("x", "y"), "m", "x"), "a": metres([1.0])})

@@ -44,7 +44,7 @@ def test_errors_are_drawn_only_for_equal_outcomes():
     assert [colour is not None for colour in colours(otherwise)[0]] == [False, True, False]
 
 
-def test_cells_that_diverge_are_drawn_without_an_error():
+def test_cells_of_diverging_walks_have_no_error_colour():
     (verdicts,), (errors, diverged) = meshes(STEP)
     expected = [VERDICT_COLOURS[name].lower() for name in ("fine", "wrong silently", "diverges")]
     assert colours(verdicts)[:, 0].tolist() == expected

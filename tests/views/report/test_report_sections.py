@@ -482,7 +482,7 @@ def test_opening_paragraph_lists_the_features_of_the_walker():
     assert "torso" not in lead(kneed, "kneed")
 
 
-def test_gaits_have_no_heading_with_one_set_of_equations():
+def test_gaits_have_headings_only_if_there_are_two_sets_of_equations():
     gait = gait_summary() | {"chosen": True, "objection": ""}
     every = {name: [gait, gait | {"chosen": False, "objection": "it scuffs"}] for name in SETS}
     heads = [

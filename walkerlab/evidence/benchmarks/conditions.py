@@ -1,4 +1,4 @@
-"""Conditions of benchmarks (the machine, and a first step that is not pinned), and formatting of error levels."""
+"""Conditions of benchmarks: the machine, and a first step that is not pinned. Also formats error levels."""
 
 import os
 import platform

@@ -136,7 +136,7 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 
 
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """Yield the series of an experiment, with runs that start on the gait. The first one of each engine is filled."""
+    """Yield the series of runs that start on the gait. The first series of each engine has filled markers."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines = rows["engine"].astype(str)
     names = rows["integrator"].astype(str)

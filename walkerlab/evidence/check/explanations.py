@@ -43,7 +43,7 @@ CONVERGED: Final = 1e-6  # a fit ends when its value changes by less than this (
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
 FIELDS: Final[Mapping[str, Any]] = {SLOPE: "slope", GRAVITY: "gravity"}
-"""Fields of the plain walker that are keys of the config itself."""
+"""Fields of the plain walker that are top-level keys of the config."""
 UNIT = re.compile(r"_(m|kg|kg_m2|rad|m_s2)$")
 
 
@@ -294,7 +294,7 @@ def find_closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, A
 
 
 def attempt_all(question: Question) -> Iterator[Attempt]:
-    """Yield the most promising candidates with their gaits, then mistakes of fitted size with theirs."""
+    """Yield the most promising candidates and then mistakes of fitted size, each with its gait."""
     right = question.guess(question.walker)
     guesses = []
     mistakes = [*plain.list_mistakes(question.walker)]

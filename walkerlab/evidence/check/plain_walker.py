@@ -43,8 +43,8 @@ LONGEST_SWING = 12.0  # sqrt(L/g), after which a swing is given up
 FALLEN = 1.5  # rad, angle of the stance leg at which the walker has fallen
 MAX_EULER_STEPS = 400_000
 LARGEST_STEP = 0.3  # sqrt(L/g), largest step of the integration
-# rounds of Newton's method that locate an event, and the time (s) over which it takes the slope of the event function
-LOCATING_ROUNDS, TINY = 4, 1e-7
+LOCATING_ROUNDS = 4  # Newton iterations that locate an event
+SLOPE_STEP = 1e-7  # s, step of the finite difference for the slope of an event function
 STRAIGHT = "straight"
 BENT = "bent"
 """Phases of a swing: with a straight leg, and with a free knee."""
@@ -446,7 +446,7 @@ def locate(
             solver.step()
         state = solver.y
         value = event(state)
-        move = float(-TINY * value / (event(state + TINY * walker.rates(phase, state)) - value))
+        move = float(-SLOPE_STEP * value / (event(state + SLOPE_STEP * walker.rates(phase, state)) - value))
     return time, state
 
 

@@ -426,7 +426,7 @@ def list_omissions(inputs: Mapping[str, Content], measured: Measured) -> list[di
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
     """Build a group with the numbers of the paper and of the models.
 
-    Text columns have all rows. The column of a model has only the rows with a value, whose indices are its coordinate.
+    Text columns have every row. A model's column holds only its values, with their row indices as its coordinate.
 
     names  symbols of the rows, if they have any
     """

@@ -27,7 +27,7 @@ VERDICTS = (
 )
 """Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
-"""Model whose scene must equal that of the paper for a mismatch to count, or "any" if the printed values decide."""
+"""A mismatch counts if this model has the paper's scene. With "any" it always does: the printed values decide."""
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:

@@ -86,9 +86,9 @@ GAIT_SERIES = STICTION_SERIES, NORMAL_SERIES
 COARSE_STRIDE = 3  # use every third setting for walkers that are slower to simulate than the compass
 SETTING = "setting"
 FACTOR_LABELS = {
-    "stiffness": Label("1", "factor on the stiffness", name="stiffness_factor"),
-    "damping": Label("1", "factor on the damping", name="damping_factor"),
-    "stiction": Label("1", "factor on the stiction and friction velocity", name="stiction_velocity_factor"),
+    "stiffness": Label("1", "factor applied to the stiffness", name="stiffness_factor"),
+    "damping": Label("1", "factor applied to the damping", name="damping_factor"),
+    "stiction": Label("1", "factor applied to the stiction and friction velocity", name="stiction_velocity_factor"),
 }
 DISTANCE_LABELS = {
     "period": Label("s", "period of the contact gait", name="period_s"),
@@ -107,7 +107,7 @@ WALK_LABELS = {
         "rad/s", "largest difference of an angular velocity at the same time", name="raw_velocity_error_rad_s"
     ),
     "numerical_time": Label(
-        "s", "change of the last touch at a hundred times tighter tolerance", name="numerical_time_s"
+        "s", "change of the last touch's time if the tolerance is a hundred times tighter", name="numerical_time_s"
     ),
     "evaluations": Label("1", "number of right-hand-side evaluations in the walk", name="rhs_evaluations"),
     "wall_s": Label("s", "processor time of the walk", timing=True),

@@ -199,7 +199,7 @@ def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, gra
 def results_to_show(
     folder: RunFolder, stages: Iterable[str], warn: Callable[[str], None], graph: Graph = PIPELINE
 ) -> Iterator[dict[str, Stored]]:
-    """Lend the existing results of these stages to a `with` block, and warn of outdated ones.
+    """Give a `with` block the existing results of these stages, and warn of outdated ones.
 
     Raises StaleError as `results_in` does, and if the block reads something that an outdated result lacks.
     """

@@ -262,11 +262,11 @@ class WorkerPool(SizedExecutor):
         finally:
             with self._lock:
                 self._busy.remove(worker)
-                # The worker may have died. The next call removes it from the list then.
+                # If the worker has died, the next call removes it from the list.
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers, with `wait` only after they have finished their calls."""
+        """End the workers. If `wait` is true, let them finish their calls first."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
         with self._lock:
             self._closed = True

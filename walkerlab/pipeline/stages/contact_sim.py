@@ -79,7 +79,7 @@ def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: 
 
 
 def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
-    """Return the asymmetry of the last stride, with that of the stance times (touch to lift), leg 2 minus leg 1."""
+    """Return the asymmetry of the last stride, including that of stance times, touch to lift (leg 2 minus leg 1)."""
     # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
     count = walk.steps - walk.steps % STRIDE
     if not count or walk.stance_s.size < count:

@@ -73,7 +73,7 @@ def refuse(config: PlanConfig) -> None:
     if not block.fit:
         raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
     if block.model == "both":
-        raise ConfigError("identify.model is both, but a plan is for one model.", "Choose --model rigid or contact.")
+        raise ConfigError("identify.model is `both`, but a plan is for one model.", "Choose --model rigid or contact.")
     refuse_model(config, block)
     refuse_keys(config, block)
     for key in plan.errors:

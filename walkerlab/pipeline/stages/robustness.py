@@ -243,7 +243,7 @@ def rough_ground_units(subject: ModelUnderTest, config: RobustnessConfig) -> Ite
     for roughness in block.roughness_m:
         for first in range(0, block.walks, WALKS_AT_ONCE):
             walks = range(first, min(first + WALKS_AT_ONCE, block.walks))
-            run = partial(rough_of, subject, roughness, config.seed, walks, most)
+            run = partial(count_steps_on_rough_ground, subject, roughness, config.seed, walks, most)
             yield WorkUnit(f"{subject.model} rough {roughness:g} {first}", len(walks), run)
 
 
@@ -252,8 +252,10 @@ def cap(model: str, config: RobustnessConfig) -> int:
     return min(config.robustness.max_steps, max(1, MAX_STEPS[model] // config.robustness.walks))
 
 
-def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
-    """Count the steps of each walk. Its ground depends only on the seed and the number of the walk."""
+def count_steps_on_rough_ground(
+    subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int
+) -> list[float]:
+    """Count the steps of walks on rough ground, which depends only on the seed and the number of the walk."""
     gait, *_ = subject.quick_by_leg()
     return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 
@@ -302,7 +304,7 @@ def sensitivities(
     jobs: int,
 ) -> Rows:
     """Return rows of derivatives in order of decreasing relative effect. Parameters with value 0 come last."""
-    keys = numbers_read(subject, requested)
+    keys = parameters_read(subject, requested)
     label = f"robustness: gradients of the {subject.model} model"
     rows = list[dict[str, Any]]()
     results = map_in_order([partial(gradients_of, subject, key) for key in keys], jobs)
@@ -329,7 +331,7 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
     return subject.gradients(parameter_of(key, subject.config), names)
 
 
-def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, either the requested ones or, for None, all."""
+def parameters_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
+    """Return the dotted keys of the parameters that the model reads, among all or among those requested."""
     selection = parameter_keys(subject.config) if requested is None else requested
     return tuple(key for key in selection if model_reads(subject.model, subject.config, key))

@@ -117,13 +117,13 @@ QUESTIONS = (
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Also report the gait's sensitivity.", "switch"),
             *recording_options("identify"),
-            Option("--plan", "", "", "Without data: predict the errors of each way to measure.", "switch", runs="plan"),
+            Option("--plan", "", "", "Predict the errors for each way of measuring the walk; needs no data.", "switch", runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),
     ),
     Stage(
         "plan", "walkerlab.pipeline.stages.plan",
-        "Find which measurements, over how many steps, determine parameters of the walker.",
+        "Find which measurements, and how many steps, it takes to determine the walker's parameters.",
         reads.PlanConfig, results_of("fixedpoint"), only_by="plan", shown_by=DRAWINGS,
         options=(
             *ESTIMATED, ERRORS_TO_REACH,

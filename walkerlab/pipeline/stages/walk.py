@@ -367,9 +367,9 @@ def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
 
 
 def steps_to_repeat_last(steps: Floats) -> int:
-    """Return the period, in steps, with which the end of a walk (steps, n) repeats, or 0.
+    """Return the number of steps after which the end of a walk (steps, n) repeats itself, or 0 if it does not.
 
-    The longest repeating part counts.
+    Of several such numbers, it is the one that holds over the longest part.
     """
     longest = max(MAX_REPEATED, len(steps) // 4)
     ends = (longest >> halvings for halvings in range(longest.bit_length()))

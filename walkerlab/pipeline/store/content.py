@@ -90,7 +90,7 @@ class Group:
         for name, variable in self.variables.items():
             for dim, size in zip(variable.dims, variable.values.shape, strict=True):
                 if sizes.setdefault(dim, size) != size:
-                    raise ValueError(f"{name!r} has {size} along {dim!r}, others have {sizes[dim]}")
+                    raise ValueError(f"{name!r} has size {size} along {dim!r}, but other variables have {sizes[dim]}")
         return sizes
 
     def __getitem__(self, name: str) -> NDArray[Any]:

@@ -211,10 +211,10 @@ class EngineExperiment:
         return EngineRow(*head, step_s, tolerance, *numbers, touches.size, answer.outcome)
 
 
-def our_walk(
+def time_our_walk(
     scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
 ) -> runs.WalkAnswer:
-    """Time our own walk over `touches` steps, or until `until_s` in the step after them.
+    """Time walkerlab's walk of `touches` steps or, if `until_s` is given, up to that time in the following step.
 
     The run time is the median over `repeats` walks.
     """
@@ -235,13 +235,13 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
     """Yield our runs over a ladder of tolerances, then our walks for comparison with native contact of engines."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     # The first walk compiles the kernels, which must not be timed.
-    our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
+    time_our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
-        answer = our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)
+        answer = time_our_walk(scene, rtol, COMPARED_TOUCHES, truth.until_s, OUR_REPEATS)
         yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
     own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
     for factor in (1.0, *START_FACTORS):
-        answer = our_walk(scene.scale_start(factor), ADAMS_RTOL, OWN_TOUCHES)
+        answer = time_our_walk(scene.scale_start(factor), ADAMS_RTOL, OWN_TOUCHES)
         yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
 
 
