@@ -166,7 +166,7 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
     if order is None or not fits or any(BODIES[body] >= bodies for body in order):
         possible = "swing, stance" + (", shank" if bodies > SHANK else "")
         raise ConfigError(
-            f"check: {name} has {count} values, which do not fit the order of bodies {', '.join(order or ['(unknown)'])}.",
+            f"check: {name} has {count} values, which do not fit the bodies {', '.join(order or ['(unknown)'])}.",
             f"Give an angle and a rate for each body of check.angles.order; this walker has {possible}.",
             ("check", "angles") if angles.order else ("check", "printed", name),
         )

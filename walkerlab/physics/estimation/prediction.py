@@ -34,7 +34,7 @@ START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
-# The same step for sampled angles. A larger one would move their kinks at heel strikes past samples.
+# Replaces EXACT_STEP for sampled angles. A larger step would shift their kinks at heel strikes across sample times.
 SAMPLED_STEP: Final = 1e-5
 # number of cached predictions; search, derivatives and checks ask for the same walks
 KEPT_PREDICTIONS: Final = 16

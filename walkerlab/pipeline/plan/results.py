@@ -136,7 +136,7 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """If the step reuses a result from the folder of another run, link or copy its file.
+        """Link or copy the file of the result if the step reuses it from the folder of another run.
 
         Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
         """

@@ -117,7 +117,7 @@ QUESTIONS = (
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Also report the gait's sensitivity.", "switch"),
             *recording_options("identify"),
-            Option("--plan", "", "", "Predict the errors for each way of measuring the walk; needs no data.", "switch", runs="plan"),
+            Option("--plan", "", "", "Without data, predict errors for each way of measuring.", "switch", runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),
     ),
