@@ -203,8 +203,11 @@ def test_energy_balances_with_the_normal_force_of_an_extension(site):
     assert "The normal-force law HuntCrossley cannot be exported." in done.stderr
 
 
-HINGES = """
-from walkerlab.physics.mechanics.hinges import HingeTorque, SpringDamper, hinge_energy, hinge_torque
+CUBIC = re.compile(r"```python.(from walkerlab.physics.mechanics.hinges.*?)```", re.DOTALL)
+# the documented cubic spring and three more laws
+HINGES = f"""
+import typing
+{CUBIC.search((ROOT / "docs" / "adding.md").read_text())[1]}
 
 class Linear(SpringDamper):
     pass
@@ -218,36 +221,36 @@ def linear(law, angle, rate):
 def linear_energy(law, angle):
     return 0.5 * law.stiffness * angle * angle
 
-class Cubic(SpringDamper):
-    pass
+class Apart(typing.NamedTuple):
+    torque: float
+    stiffness: float
+    damping: float
+    units = None
 
-@hinge_torque.case(Cubic)
-def cubic(law, angle, rate):
-    elastic = law.stiffness * angle**3
-    resistance = elastic + law.damping * rate - law.torque
-    return HingeTorque(resistance, elastic, 3.0 * law.stiffness * angle**2, law.damping)
-
-@hinge_energy.case(Cubic)
-def cubic_energy(law, angle):
-    return 0.25 * law.stiffness * angle**4
+@hinge_torque.case(Apart)
+@hinge_energy.case(Apart)
+def apart(law, angle, rate=0.0):
+    return law.torque
 
 class Halfway(SpringDamper):
     pass
 
 @hinge_torque.case(Halfway)
 def halfway(law, angle, rate):
-    return cubic(law, angle, rate)
+    return cubic_torque(law, angle, rate)
 """
 
 
 @pytest.fixture(scope="module")
 def hinges(tmp_path_factory):
-    """Packages with hinge laws: a copy of the built-in one, a cubic spring, and one without an energy."""
+    """A package of hinge laws: the built-in one's copy, the cubic spring of the docs, and three with a fault."""
     site = Site(tmp_path_factory.mktemp("hinges"))
     laws = {"copy": "hinge_laws:Linear", "cubic": "hinge_laws:Cubic", "halfway": "hinge_laws:Halfway"}
+    laws |= {"apart": "hinge_laws:Apart", "torn": "torn_law:Torn"}
     declaration = f"from walkerlab.extensions import Extension\nEXTENSION = Extension(1, hinge_law={laws})\n"
     add(site.packages, "hinges", declaration)
     (site.packages / "hinge_laws.py").write_text(HINGES)
+    (site.packages / "torn_law.py").write_text("1 / 0\n")
     return site
 
 
@@ -275,10 +278,18 @@ def test_energy_balances_with_the_cubic_hip_spring_of_an_extension(hinges):
     assert cubic["step_period_s"] != sprung_walk(hinges, "contact-sim", "linear")["step_period_s"]
 
 
-def test_incomplete_hinge_law_is_refused_before_the_walk(hinges):
-    done = hinges("simulate", "--set", "walker.hip.hinge_law=halfway", "--name", "halfway")
+REFUSALS = {
+    "halfway": "the hinge law Halfway ('halfway') is incomplete: it lacks a case @hinge_energy.case(Halfway)",
+    "apart": "the hinge law Apart ('apart') is incomplete: it lacks the base class SpringDamper",
+    "torn": "hinge_law: the code of 'torn' cannot be imported: ZeroDivisionError: division by zero",
+}
+
+
+@pytest.mark.parametrize("law", REFUSALS)
+def test_faulty_hinge_law_is_refused_before_the_walk(hinges, law):
+    done = hinges("simulate", "--set", f"walker.hip.hinge_law={law}", "--name", law)
     assert done.returncode == 3
-    assert "the hinge law Halfway ('halfway') is incomplete: it lacks a case @hinge_energy.case(Halfway)" in done.stderr
+    assert REFUSALS[law] in " ".join(done.stderr.split())
 
 
 def test_other_programs_refuse_the_hinge_law_of_an_extension(hinges):

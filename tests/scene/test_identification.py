@@ -13,6 +13,8 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
+from walkerlab.physics.estimation.fit import fit, refit
+from walkerlab.physics.estimation.judgement import spectral_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.result import USABLE
 from walkerlab.physics.orbits.step_map import StepMap
@@ -55,6 +57,27 @@ def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
     assert own - plain.mean() > 2.0 * plain.std(ddof=1) / np.sqrt(len(plain))
     assert abs(corrected.mean() - own) < 2.5 * errors.mean() / np.sqrt(len(plain))
     assert 0.5 < errors.mean() / corrected.std(ddof=1) < 2.0
+
+
+def test_quantity_that_a_coarse_clock_shows_as_constant_leaves_the_multiplier_as_it_is():
+    lengths = np.array([0.9, -0.5, 0.3, -0.1, 0.08, -0.2, 0.1, 0.05, -0.03, 0.02])[:, None]
+    with_periods = np.column_stack((np.full(10, 0.75), lengths))
+    assert spectral_radius(with_periods) == pytest.approx(spectral_radius(lengths), rel=1e-12)
+    assert 0.3 < spectral_radius(lengths) < 0.8
+
+
+def test_quick_refit_stays_at_the_estimate_of_a_soft_loss():
+    """If the outlier was not trimmed, it would move the estimate."""
+    measured, _ = truth().walk(0)
+    periods = measured.periods_s.copy()
+    periods[7] += 0.02
+    own = truth()
+    subject = find_model_gait("rigid", own.config, own.gait, lambda _: None)
+    question = Identify(fit=dict.fromkeys(KEYS), loss="soft_l1")
+    problem = problem_of(subject, replace(measured, periods_s=periods), question)
+    fitted = fit(problem, problem.initial_unknowns())
+    errors = np.sqrt(np.diag(np.linalg.inv(fitted.evaluation.information)))
+    assert np.all(np.abs(refit(problem, fitted.u, fitted).u - fitted.u) < 0.1 * errors)
 
 
 def test_multipliers_are_not_measured_from_seven_steps():

@@ -136,6 +136,7 @@ class LawKind(NamedTuple):
     protocol: type
     required: tuple[ByType, ...]  # functions of which each law needs a case
     together: tuple[ByType, ...] = ()  # functions of which a law needs either all cases or none
+    derived: bool = False  # whether a law's class must derive from `protocol`, whose fields it then has
 
 
 class ByAddress(types.Type):

@@ -21,8 +21,12 @@ def law_class(kind: LawKind, word: str) -> Any:
     """
     try:
         law = kind.laws.get(word) or load(code_by_word(kind.key)[word])
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{error}.", where_to_look(kind)) from error
+    # The code is another package's, which may raise anything.
+    except Exception as error:
+        raise ConfigError(
+            f"{kind.key}: the code of '{word}' cannot be imported: {type(error).__name__}: {error}.",
+            "`walkerlab extensions` shows which package adds it.",
+        ) from error
     if missing := missing_members(law, kind):
         named = f"the {kind.key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
         raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(kind))
@@ -46,6 +50,8 @@ def missing_members(law: type, kind: LawKind) -> list[str]:
     """List what the class of a law lacks: members of the protocol, and registered cases of functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
+    if kind.derived and not issubclass(law, kind.protocol):
+        missing = [f"the base class {kind.protocol.__name__}"]
     # A law with one of these functions needs the others, too. For example, counted events must also be sampled.
     together = kind.together if any(law in function for function in kind.together) else ()
     cases = [function for function in (*kind.required, *together) if law not in function]

@@ -211,7 +211,7 @@ def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
 
     The unknowns are fitted with the noise of `like`, then the standard deviations. Returns None if a walk ends early.
     """
-    data = linearise(problem, start, like.disturbances)
+    data = linearise(problem, start, like.disturbances, robust=robust_scatter(like.rows, like.noise))
     if data is None:
         return None
     u = least_squares_fit(problem, start, start, like.heights_m, data, like.noise)

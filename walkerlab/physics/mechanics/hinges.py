@@ -78,7 +78,9 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-HINGE_LAWS: Final = LawKind("hinge_law", {"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy))
+HINGE_LAWS: Final = LawKind(
+    "hinge_law", {"linear": SpringDamper}, SpringDamper, (hinge_torque, hinge_energy), derived=True
+)
 """Hinge laws by their names in `walker.hip.hinge_law` of a config."""
 LAW_NUMBERS = len(SpringDamper._fields)
 DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))
