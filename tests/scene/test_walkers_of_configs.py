@@ -26,7 +26,7 @@ def numbers_of(model: RigidModel):
 
 
 def test_kneed_walker_equals_its_description_by_parts(tmp_path):
-    (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
+    (text,) = re.findall(r"```yaml\n(# own-parts.yaml\n.*?)```", DOCS.read_text(), re.DOTALL)
     path = tmp_path / "own-parts.yaml"
     path.write_text(text)
     own, kneed = load(path).config, load(Path("kneed")).config
@@ -164,7 +164,7 @@ def test_impossible_walkers_are_rejected_with_the_reason(config, setting, said):
     ],
 )  # fmt: skip
 def test_parts_that_form_no_walker_are_rejected(tmp_path, old, new, said):
-    (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
+    (text,) = re.findall(r"```yaml\n(# own-parts.yaml\n.*?)```", DOCS.read_text(), re.DOTALL)
     assert old in text
     path = tmp_path / "broken.yaml"
     path.write_text(text.replace(old, new))

@@ -503,4 +503,4 @@ def test_config_without_contact_states_the_required_friction_once():
 
 
 def test_page_names_the_friction_law():
-    assert "there is creeping friction of its own kind." in texts(sections()["contact"])
+    assert "There is creeping friction of its own kind." in texts(sections()["contact"])

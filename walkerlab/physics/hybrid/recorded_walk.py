@@ -323,7 +323,7 @@ def driven_work(
 
 def elastic_energies(law: SpringDamper, angles: Array) -> Array:
     """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
-    return np.array([hinge_energy(law, angle) for angle in angles])
+    return np.fromiter((hinge_energy(law, angle) for angle in angles), float, len(angles))
 
 
 def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
