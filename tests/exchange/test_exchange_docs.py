@@ -59,4 +59,4 @@ def test_walker_walks_in_plain_mujoco_and_in_gymnasium(folder, monkeypatch, caps
     assert observation.shape == first.shape == walker.observation_space.shape
     assert sum(rewards) > 0.3
     exec(writing, names)
-    assert Path("round.acf").is_file()
+    assert Path("heavy.acf").is_file()
