@@ -334,7 +334,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     fixed = [*fixed_parameters(subject, question, best, fixed_keys(subject, question))]
     # A separate call, because leg 2 follows changes of leg 1 only while no parameter of leg 2 is varied with them.
     other_leg = [*fixed_parameters(subject, question, best, [second_leg])][:1] if second_leg else []
-    verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
+    verdicts = [judge(each) for each in ([best] if steps is best else [steps, best])]
+    verdict = next((each for each in verdicts if each[0] not in USABLE), verdicts[-1])
     if verdict[0] in USABLE:
         others = (other_leg, fixed) if len(left_open) < len(keys) else ()
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())

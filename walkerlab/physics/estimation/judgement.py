@@ -182,8 +182,8 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     for each in (before, after):
         for first in range(stride):
             each[..., first::stride, :] -= each[..., first::stride, :].mean(axis=-2, keepdims=True)
-    # In units of their scatter all quantities are of the same size, so the pseudo-inverse drops none of them but those
-    # that are constant, as coarse clocks show periods.
+    # In units of their scatter all quantities are of the same size, so the pseudo-inverse drops none of them, except
+    # constant ones, such as periods from a coarse clock.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     scale[scale == 0.0] = 1.0
     before, after = before / scale, after / scale
