@@ -20,7 +20,7 @@ from process_table import THERE, is_alive, processes_below
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.run import work
 from walkerlab.pipeline.run.work import JobEndedError, Spread, WorkUnit, compute
-from walkerlab.pipeline.run.workers import ONE_THREAD, WorkerPool
+from walkerlab.pipeline.run.workers import ONE_THREAD, WorkerDiedError, WorkerPool
 from walkerlab.pipeline.sweeps import engines
 from walkerlab.pipeline.sweeps.engines import (
     ENGINES,
@@ -253,6 +253,44 @@ def test_unfinished_units_of_a_job_are_computed_by_another(slow, given_up):
     assert lost == given_up
     assert sorted(names + lost) == [unit.name for unit in units]
     assert all("before it had computed one unit" in text for text in why)
+
+
+class OneFate(WorkerPool):
+    """A worker that takes everything it was given with it when it dies, as in Dask."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.waiting = []
+
+    def submit(self, fn, batch):
+        future = Future()
+        self.waiting.append((future, batch))
+        threading.Timer(0.02, self.work).start()
+        return future
+
+    def work(self):
+        given, self.waiting = self.waiting, []
+        dies = any(unit.name == "deadly" for _, batch in given for unit in batch)
+        for future, batch in given:
+            if dies:
+                future.set_exception(WorkerDiedError(-signal.SIGKILL))
+            else:
+                future.set_result(compute(batch))
+
+
+def test_unit_beside_a_deadly_one_gets_a_last_attempt_alone():
+    names, lost = [], []
+    units = [WorkUnit(name, 1, int) for name in ("deadly", "beside")]
+    with OneFate() as worker:
+        Spread(
+            iter(units),
+            2,
+            lambda batch, _: names.extend(unit.name for unit in batch),
+            lambda unit, _: lost.append(unit.name),
+            0.0,
+            1e-3,
+        ).run(worker)
+    assert (names, lost) == (["beside"], ["deadly"])
 
 
 FAKE_SQUEUE = """#!/bin/sh

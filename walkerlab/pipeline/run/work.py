@@ -26,8 +26,9 @@ BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, Loo
 MAX_DEATHS: Final = 12
 """Maximum number of worker deaths before the first result. If there are more, the cause is the machine, not the work.
 """
-
-
+LAST_ATTEMPT: Final = 3
+"""Failures after which a unit gets its last attempt. Then it runs alone, because Dask counts the death of a worker
+against everything that this worker was given."""
 NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, before it had computed one unit"
 
 
@@ -88,6 +89,7 @@ class Spread:
     batch_s: float  # target duration of a batch, s; 0: one unit at a time
     unit_s: float | None = None  # run time of a unit, s; None until the first batch, which runs alone, has returned
     _again: deque[tuple[Batch, int]] = field(default_factory=deque)
+    _suspects: deque[Batch] = field(default_factory=deque)  # units at their last attempt, which run alone, at the end
     _running: dict[Future[Any], tuple[Batch, int]] = field(default_factory=dict)
     _deaths: int = 0
     _alive: bool = False
@@ -97,7 +99,9 @@ class Spread:
 
         Raises NoAnswer if workers keep dying before they compute anything, and bugs immediately.
         """
-        while self.left or self._again or self._running:
+        while self.left or self._again or self._running or self._suspects:
+            if not (self.left or self._again or self._running):
+                self._again.append((self._suspects.popleft(), LAST_ATTEMPT))
             # One batch more than workers is handed out, so that no worker has to wait for its next one.
             max_running = 1 if self.unit_s is None else executor.size + 1
             while len(self._running) < max_running and (self._again or self.left):
@@ -152,11 +156,13 @@ class Spread:
         middle = len(batch) // 2
         if failures and middle:
             self._again.extend((half, 1) for half in (batch[:middle], batch[middle:]))
-        elif failures < 3:
+        elif failures + 1 < LAST_ATTEMPT:
             self._again.append((batch, failures + 1))
-        else:
+        elif failures < LAST_ATTEMPT:
             # If it stayed None, all further batches would run alone.
             self.unit_s = self.unit_s or 1.0
+            self._suspects.append(batch)
+        else:
             self.give_up(batch[0], error)
 
 
