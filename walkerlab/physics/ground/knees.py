@@ -11,8 +11,8 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-# rad, flexion that a released knee must exceed before it can lock again. At its release a knee is straight to rounding,
-# and would lock again at once.
+# rad, flexion that a released knee must exceed before it can lock again. Without it, the knee would lock at once,
+# because it is straight up to rounding when it is released.
 MIN_FLEXION = 0.01
 
 
@@ -22,7 +22,10 @@ class IdealLock(NamedTuple):
 
 @kernel_part
 def angle_between(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """Return the angle (rad) from a hinge's second body to its first, or its rate if y[first] is the first rate."""
+    """Return the angle (rad) of a hinge's first body relative to its second, or its rate (rad/s).
+
+    first  index in y of the first angle, or of the first rate
+    """
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 

@@ -86,7 +86,7 @@ def earliest_crossing(
         if foot == system.form.pinned:
             continue
         row = foot * events.PER_FOOT
-        # A foot in the air has no force that switches, and switching after a touch belongs to the next solver step.
+        # Only a foot on the ground has a force that can switch. After a touch, the next solver step takes care of that.
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + events.HEIGHT] < 0
         # The rows of a foot begin with its height and edges. The switching points follow.
         end = row + events.RELEASE
@@ -114,7 +114,7 @@ def earliest_crossing(
 def earlier_event(
     first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int
 ) -> tuple[float, int]:
-    """Return the earlier one of `first` and `event`, as a fraction of the solver step and the number of the event."""
+    """Return the earlier of `first` and `event`, as a fraction of the solver step and the number of the event."""
     fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
     return (fraction, event) if fraction < first[0] else first
 

@@ -258,7 +258,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         before[i] = y[i]
     derivative(system, method.clock[stepping.T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
-    # The solver step ends at the event up to the error of its dense output, so a step of first order bridges the rest.
+    # The solver step misses the event only by the error of its dense output, so a step of first order covers the rest.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]

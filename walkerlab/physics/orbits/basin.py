@@ -71,7 +71,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
     points: Floats  # (period, 3) section points in walking order, a stride apart, starting with the smallest angle
-    reach: float  # distance from which all test walks return to it; zero if not all return from any distance tried
+    reach: float  # largest distance tried from which all test walks return to it, or zero if there is none
 
     @property
     def period(self) -> int:

@@ -203,7 +203,7 @@ class BranchTracer:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
             before = last
             last = solved
-        # Begin at an unstable gait, so that no stable stretch is split.
+        # A closed branch begins at an unstable gait, so that no stable stretch is split.
         if end.reason == CLOSED_LOOP:
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
             points = [*points[begin:-1], *points[: begin + 1]]

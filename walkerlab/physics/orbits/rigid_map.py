@@ -216,10 +216,10 @@ class RigidStepper(local):
         start: Floats | None = None,
         observer: Observer | None = None,
     ) -> Steps:
-        """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
+        """Walk from z (d,). Without the derivative, if `derived` is false, this takes a third less work.
 
         floor  rises and nearest landing, as in `HeelStrikes`, in units of the walker. The default is even ground
-        start  (2 n,) state off the section from which to walk instead of z, without a derivative
+        start  (2 n,) state from which to walk instead of z, without a derivative. It need not lie on the section
         """
         d, size = section.basis.shape
         method, columns = (self.memory.varied, d) if derived else (self.plain, 0)

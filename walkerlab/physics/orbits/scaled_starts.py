@@ -74,7 +74,7 @@ class ScaledStarts:
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
         """Return the number of steps after which periods and lengths match the gait.
 
-        Returns None if those of the last step do not.
+        Returns None if the last step does not match.
         """
         if self.gait is None:
             return None
@@ -175,7 +175,7 @@ def smallest_change(
     """Find the start nearest to (1, 1) that leads to walking, on finer and finer grids around the nearest candidate.
 
     starts      starts with the config's solver tolerances
-    quick       the same starts with the map's tolerances; the result walks with both
+    quick       the same starts with the map's tolerances; the result leads to walking with both
     candidates  (n, 2) factors of a map's cells that lead to walking
     cell        spacing of the map's cells
     """
@@ -191,7 +191,7 @@ def smallest_change(
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
             nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
-            # Evaluated one at a time, the cheap walk first: most points need no more.
+            # Points are evaluated one at a time, the cheap walk first, because most points need no more.
             both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))

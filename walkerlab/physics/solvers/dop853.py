@@ -239,7 +239,7 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
 
 @stepping.interpolate.case(Dop853)
 def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> None:
-    """Evaluate Hairer's contd8, with nested products expanded into one weight per row."""
+    """Evaluate the dense output (Hairer's contd8), with nested products expanded into one weight per row."""
     s, r, d = fraction, 1.0 - fraction, method.dense
     w1 = s * r
     w3 = s * r * s * r

@@ -1,8 +1,8 @@
 """Zero crossings of event functions within a step, including several crossings in one step.
 
 Within a step, an event function is replaced by the polynomial through its values on the dense output. In Bernstein
-form, a polynomial lies in the hull of its coefficients, so coefficients of one sign prove that there is no crossing;
-otherwise bisection isolates the crossings. A sign check at the ends of a step would miss double crossings.
+form, a polynomial lies in the hull of its coefficients, so coefficients of one sign prove that there is no crossing.
+Otherwise bisection isolates the crossings. A sign check at the ends of a step would miss double crossings.
 
 A crossing is a change of sign. An event function that touches zero and turns back does not cross. The last event leaves
 its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a

@@ -63,7 +63,7 @@ METHODS = {
 def method_named(name: str) -> Method:
     """Return a method by name.
 
-    Raises KeyError with all names for an unknown one.
+    Raises KeyError for an unknown name, with a list of all names.
     """
     if name in METHODS:
         return METHODS[name]
