@@ -129,7 +129,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
-    # The first walk also loads data into caches, which does not matter for a long walk, so only then does it count.
+    # The first walk also loads data into caches. It counts only if it is so long that this does not matter.
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -237,7 +237,7 @@ def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 
 
 def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
-    """Yield the walks for the measurement: rigid, on compliant ground and, for the compass, near the rigid limit."""
+    """Yield the walks to measure: in the rigid model, on compliant ground and, for a compass, on near-rigid ground."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
     start = scale_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
@@ -280,7 +280,7 @@ def summarise(
 
 
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Return for each method the fastest run on a scene with an error of at most `level`, the fastest method first."""
+    """Return the fastest run of each method on a scene with an error of at most `level`, the fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:

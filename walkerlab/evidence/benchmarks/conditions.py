@@ -1,4 +1,4 @@
-"""Conditions of benchmarks: the machine, and a first step that is not pinned. Also formats error levels."""
+"""Conditions of benchmarks: the machine, and the omission to report if the first stance foot would be pinned."""
 
 import os
 import platform

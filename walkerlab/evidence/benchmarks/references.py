@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import Numbers
 
 TAYLOR_METHOD = "heyoka-taylor"
-STOPPED_BY_EVENT = -1  # outcome of heyoka after a stop at the first terminal event, but not for failures or time limits
+STOPPED_BY_EVENT = -1  # code of heyoka for a stop at the first terminal event. Failures and time limits have others
 
 
 def has_heyoka() -> bool:
@@ -117,7 +117,7 @@ class Reference:
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def reference_for(self, method: str) -> End:
-        """Return the end state with which to compare a method: always that of another method."""
+        """Return the end state with which to compare a method. It was computed by another method."""
         return self.second if method == self.first.method else self.first
 
 

@@ -287,7 +287,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
         "state_after_step": checked.convention.write(walker, plain.full_state(walker, step.after)),
     }
     if checked.convention.origin == "vertical" and checked.convention.instant == "after-strike":
-        # both feet stand on the slope that the legs' angles have
+        # the slope on which both feet stand with the legs at these angles
         answer["slope_rad"] = walker.slope - 0.5 * walker.feet_apart(start)
     return answer
 

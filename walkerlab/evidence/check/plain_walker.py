@@ -86,7 +86,7 @@ class PlainWalker:
     # mistakes
     signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors on velocity terms, by phase
     keeps_trailing_rate: bool = False
-    # weights of trailing and leading rate in an extra term I * rate of the strike's balance
+    # weights of the trailing and the leading leg's rates in the extra term I * rate of the balance at a strike
     extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
     # whether the trailing leg turned about the same point of its foot before the strike
@@ -204,11 +204,11 @@ class PlainWalker:
         return -1j * self.gravity * cmath.exp(1j * self.slope)
 
     def swing_foot(self, state: Floats) -> complex:
-        """Return the position of the swing foot relative to the stance foot (arc centres, swing leg straight)."""
+        """Return the vector from the arc centre of the stance foot to that of the swing foot, for straight legs."""
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return the sum (rad) of the angles of both legs, from hip to foot, less the window. It is 0 at a touch."""
+        """Return the sum (rad) of both legs' angles minus the window, which is 0 at a touch."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
@@ -257,7 +257,7 @@ def name_balances(walker: PlainWalker) -> tuple[str, ...]:
 def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats]:
     """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
 
-    before  state just before the strike, swing leg straight
+    before  state just before the strike, with a straight swing leg
     """
     Z = REDUCTIONS[BENT if walker.free_at_strike else STRAIGHT]
     old_angles, old = walker.bodies(STRAIGHT, before)

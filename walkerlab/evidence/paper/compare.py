@@ -63,7 +63,7 @@ def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | 
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Return the times (s) of a walk's steps, or nothing if they were not stored."""
+    """Return the times (s) of the steps of a walk. The array is empty if they were not stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
@@ -79,7 +79,7 @@ def motion_of(walk: Content) -> comparison.Motion | None:
     trajectory = walk["trajectory"]
     strikes = times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
-    # Where a knee does not lock, the time is NaN, which is not above 0.
+    # If a knee did not lock, its time is NaN. The comparison drops it, because NaN is not above 0.
     motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
     return comparison.add_strike_samples(motion)
 

@@ -173,7 +173,7 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
 
 
 def softening_in_metres() -> float:
-    """Return by which factor an ADAMS default of the stiffness is lower in metres than in millimetres."""
+    """Return the factor by which a default stiffness of ADAMS is lower in a model in metres than in millimetres."""
     return float(MM_PER_M ** (Contact().exponent - 1.0))
 
 
@@ -277,7 +277,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
 
 
 def start_error() -> tuple[Printed, str]:
-    """Return the largest error, which is printed as smaller than the difference between the two starts."""
+    """Return the largest error as printed, and the reason why it is wrong: the two starts alone differ by more."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (
         f"the two starts of Table 2 alone differ by {angle:.4f} rad and {rate:.2f} rad/s, "

@@ -369,7 +369,7 @@ class TuneRun:
     def take(self, name: str, state: State) -> None:
         """Simulate and record a walk of the procedure, with its numerical error unless the solver failed.
 
-        name  its key in `walks`
+        name  key of the walk in `walks`
         """
         walk = self.walks[name] = self.walk(state, name == "hinged")
         report = self.printed[name] = walk_summary(walk)

@@ -132,7 +132,7 @@ class SwingMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def share_of(self, leg: int) -> Floats:
-        """Return the fraction of each body that belongs to a leg (bodies,). Only coupled bodies belong in part."""
+        """Return the fraction of each body that belongs to a leg (bodies,): 0 or 1, except for coupled bodies."""
         names = [body.name for body in self.assembly.bodies]
         of_leg = self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])

@@ -1,4 +1,4 @@
-"""Experiments in other engines, compared with our own solution: same law, own law, and a swing without contact.
+"""Experiments in other engines, compared with our solution: under the same law, under their own, and without contact.
 
 Under the same law, an engine integrates our contact forces. Under its own law, it computes contact by its native model.
 Engines run in separate processes, so that a crash or hang does not stop the stage.
@@ -246,7 +246,7 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
-    """Return the step sizes of an integrator or, if it is adaptive, its tolerances, from coarse to fine.
+    """Return the step sizes to try with an integrator, from coarse to fine, or the tolerances if it is adaptive.
 
     steps_s  step sizes (s) for fixed steps
     """
