@@ -139,8 +139,8 @@ def read_code(path: Path) -> Any:
 
 
 def strip_bitcode(path: Path) -> bytes:
-    """Return the content of a kernel's file, but of the LLVM bitcode, most of the file, keep only the symbol names."""
-    # Only linking needs the bitcode itself, and stored kernels are never linked.
+    """Return the content of a kernel's file without its LLVM bitcode, of which only the symbol names are kept."""
+    # The bitcode is most of the file. Only linking needs it, and stored kernels are never linked.
     (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)
     names = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
@@ -157,7 +157,7 @@ def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
 
 
 def classes_in(kind: Any) -> Iterator[type]:
-    """Yield the NamedTuple classes in a Numba type or in a tuple of types, and those that records name."""
+    """Yield the NamedTuple classes in a Numba type or in a tuple of types, and those named by record types."""
     yield from classes_named_by(getattr(getattr(kind, "dtype", kind), "fields", ()))
     if hasattr(kind, "instance_class"):
         yield kind.instance_class

@@ -236,7 +236,7 @@ def _closed_to_others(folder: Path) -> Path:
 
 
 def _remove_unused(generations: list[Path]) -> None:
-    """Delete folders unused for a long time, except the latest few. A process that still uses one compiles again."""
+    """Delete folders unused for a long time, except the latest few. A process can compile again what it then lacks."""
     last_used: dict[Path, float] = {}  # s since the epoch
     for folder in generations:
         with contextlib.suppress(OSError):  # another process may have deleted it

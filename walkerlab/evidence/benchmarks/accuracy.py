@@ -54,7 +54,7 @@ class MethodRun:
     walls_s: tuple[float, ...]
 
     def pack(self) -> Numbers:
-        """Return the numbers that `unpack` takes, for a checkpoint."""
+        """Convert the run to numbers for a checkpoint. `unpack` converts them back."""
         run = self.result
         counts = run.rhs_evaluations, run.accepted, run.rejected
         state = run.state.tolist()
@@ -187,7 +187,7 @@ OMISSION_OFF_COMPASS = {
     "why": "only the compass has it",
     "saves": "a minute",
 }
-START_RATE_FACTOR = 0.98  # factor on the velocities of the gait: on the gait itself, all steps would be the same
+START_RATE_FACTOR = 0.98  # factor applied to the gait's velocities, because on the gait itself all steps are the same
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:

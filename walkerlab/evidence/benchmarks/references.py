@@ -90,7 +90,7 @@ class End:
     rhs_evaluations: int = 0  # 0 if they are not counted
 
     def pack(self) -> Numbers:
-        """Return the numbers that `unpack` takes, for a checkpoint."""
+        """Convert the end state to numbers for a checkpoint. `unpack` converts them back."""
         return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
 
     @classmethod
@@ -122,7 +122,7 @@ class Reference:
 
 
 class WalkEndsError(Exception):
-    """The walk does not reach its last step within the budget, so there is no end state to compare."""
+    """Raised if a walk does not reach its last step within the budget, so that there is no end state to compare."""
 
 
 def reference_for(trial: Trial) -> Reference:

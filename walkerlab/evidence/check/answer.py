@@ -329,9 +329,9 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
 
 
 def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
-    """Return the change of energy (J) from the printed state just after a strike to that just before the next one.
+    """Return the change of energy (J) between the printed state just after a strike and the one just before the next.
 
-    Return nothing if one of them is not printed.
+    The result is empty if one of them is not printed.
     """
     walker = checked.walker
     if walker.kneed or checked.convention.instant != "after-strike":
@@ -361,7 +361,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
-    """Compare both routes: in the plain model, the gait of the compiled model must return to itself after a step."""
+    """Compare both models: in the plain model, the gait of the compiled model must return to itself after a step."""
     unit = plain.scales(gait.walker, len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())

@@ -84,7 +84,7 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
 def list_misprints(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
     """Return the values that may have been misprinted as `value`, each with a description of the misprint.
 
-    values  parameters of the config, one of which may have been printed for another
+    values  parameters of the config, one of which may have been printed in place of another
     """
     unit = UNIT.findall(key)
     found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
@@ -254,7 +254,7 @@ def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[
 
 
 def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions that fit the printed values better than the stated one, and the question in each of them.
+    """Yield conventions that fit the printed values better than the stated one, each with the question restated in it.
 
     A convention must bring the right gait much closer to the printed values, or at least closer if it puts both feet on
     the slope and the stated one does not.
@@ -294,7 +294,7 @@ def find_closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, A
 
 
 def attempt_all(question: Question) -> Iterator[Attempt]:
-    """Yield the most promising candidates and then mistakes of fitted size, each with its gait."""
+    """Yield the most promising candidates, then mistakes with a fitted size, each with its gait."""
     right = question.guess(question.walker)
     guesses = []
     mistakes = [*plain.list_mistakes(question.walker)]

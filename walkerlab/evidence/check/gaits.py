@@ -52,7 +52,7 @@ CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
         **{f"{gravity:g}": f"gravity is {gravity:g} m/s²" for gravity in GRAVITIES},
     }),
 }  # fmt: skip
-"""Choices that make up a convention: for each, a clause about it, and the words that its values put in there."""
+"""Choices that make up a convention. Each has a clause with a gap and, for each value, the words that fill the gap."""
 BEFORE: Instant = "before-strike"
 Values = dict[str, complex | None]
 """Values of printed numbers by name, or None for a number that the gait does not have."""

@@ -32,7 +32,7 @@ class Printed(PrintedNumber):
 
     @property
     def rounding(self) -> tuple[float, float]:
-        """Smallest and largest value that are rounded to the printed one."""
+        """Smallest and largest value that round to the printed one."""
         half = 0.5 * self.digits.unit
         return self.value - half, self.value + half
 
@@ -180,7 +180,7 @@ def softening_in_metres() -> float:
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
     """Return how a foot rests on the ground for three readings of Fig. 4b.
 
-    They are in N, mm and s, in SI, and as the defaults of an ADAMS model in metres.
+    Its values are read in N, mm and s, in SI, and as the defaults of an ADAMS model in metres.
 
     Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.
@@ -206,7 +206,7 @@ def contradictions() -> MappingProxyType[Printed, str]:
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
-    """Return the range of a function over all values that are rounded to the printed ones.
+    """Return the range of a function over all values that round to the printed ones.
 
     The function must be monotonic in each argument.
     """

@@ -50,7 +50,7 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope. Footholds before 0, that of the start, have its height."""
+    """Return the height (m) of a foothold above the slope. Those before foothold 0, the start's, have its height."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
@@ -91,7 +91,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether a foot in the air has ground below it. Pads do not change that, but a plane applies `order_matters`."""
+    """Whether a foot in the air has ground below it, which may change on a plane where the order of the feet matters."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

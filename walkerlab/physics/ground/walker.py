@@ -34,7 +34,7 @@ RELEASED, BENT, STOPPING, LOCKED = range(4)
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants (SI) of the walker in one form: free or pinned, with certain knees locked. A structured scalar."""
+    """Structured scalar with the constants (SI) of the walker in one form: free or pinned, some knees locked."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers. Only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
@@ -187,7 +187,7 @@ def place_on_ground(
 
 @kernel_part
 def locked_knees(knee: Any) -> int:
-    """Return the index of a form by its locked knees: 0 for none, 1 for the first, 2 for the second, 3 for both."""
+    """Return the index of the form in which these knees are locked: 0 for none, 1 or 2 for one, 3 for both."""
     return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
 
 

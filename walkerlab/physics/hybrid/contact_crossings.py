@@ -78,7 +78,7 @@ def sample_foot(
 def earliest_crossing(
     system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and its number."""
+    """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and the event."""
     ground = walk_state.ground
     progress = walk_state.progress
     first = NO_CROSSING, events.NO_EVENT

@@ -47,7 +47,7 @@ RADAU_WEIGHTS = np.array(
 
 @pass_by_reference
 class Tangent(NamedTuple):
-    """Derivative Phi of the state by the start, and workspace for it. The free walker with all bodies has n states."""
+    """Derivative Phi of the state with respect to the start, and workspace. The free walker's state has n values."""
 
     # If locked knees or a pinned foot reduce the state, only the first rows are used.
 
@@ -178,7 +178,7 @@ CONTACT_TALLY = record_type(ContactTally, {})
 
 @pass_by_reference
 class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk. Each is skipped if not requested."""
+    """Samples, energy balance and tangent of a walk. Those that are not requested are skipped."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples

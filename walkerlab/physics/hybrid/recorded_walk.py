@@ -280,7 +280,7 @@ class Recorder:
 
 
 def mean_energy(walker: RigidModel, tally: RigidTally, start: State, strikes: Array, after: Array) -> float:
-    """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
+    """Compute the time mean of the energy (J), with heights from the contact point at the touch before each step."""
     touched = np.append(start[rigid.STANCE], after[:, rigid.STANCE])
     zeros = rigid.compute_in_turns(walker, np.arange(touched.size), rigid.energy_at_touch, touched)
     if tally.duration == 0.0:
@@ -322,7 +322,7 @@ def driven_work(
 
 
 def elastic_energies(law: SpringDamper, angles: Array) -> Array:
-    """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
+    """Return the elastic energy (J) of a hinge law at each angle, one by one, because not all laws take arrays."""
     return np.fromiter((hinge_energy(law, angle) for angle in angles), float, len(angles))
 
 

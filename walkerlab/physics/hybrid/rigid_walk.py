@@ -78,7 +78,7 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 
 @kernel_part
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and their rates.
+    """Compute the heel strike's event function, a function that is positive if the swing foot leads, and their rates.
 
     For straight legs that are alike, on even ground, both functions are linear in the angles, so scuffing near
     mid-swing is not a zero. Otherwise they are the foot's height above its next foothold and its distance ahead.

@@ -245,7 +245,7 @@ def project(
 ) -> None:
     """Write the angular velocities (rad/s) after an impact, or a change of them, into p (n,).
 
-    omega, along, upward  velocities u before the impact, or their change: the bodies' (n,) in rad/s, the root's in m/s
+    omega, along, upward  velocities u before the impact, or their change, of bodies (n,) in rad/s and root in m/s
     twist                 N m s, impulse on the stance leg, or its change
     turned                (n,) change of momentum due to a change of the angles; zero for velocities
     """

@@ -28,7 +28,7 @@ NO_SHANK = -1
 
 @tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants of the rigid model in SI, a structured scalar whose type fixes the number n of bodies."""
+    """Structured scalar with the constants (SI) of the rigid model. Its type fixes the number n of bodies."""
 
     # E holds three reductions: BENT, STRAIGHT and AT_STRIKE. If the legs differ, `paired_with` is the model in which
     # the other leg swings. It is not a field, because kernels take both models as an array (see `models_in_turn`).
@@ -102,7 +102,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
 
 def replace_fields(model: Any, fields: Any) -> RigidModel:
-    """Return a read-only copy of a model with some fields changed. The copy has no partner."""
+    """Return a read-only copy of a model with some fields changed. The copy is not paired with another model."""
     memory: Any = np.empty((), model.dtype)
     memory[()] = model
     tree.write_fields(memory, fields)
@@ -424,7 +424,7 @@ def hip_height(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
-    """Compute the sum (rad) of the straight legs' angles from the slope's normal, zero if both feet are on even ground.
+    """Compute the sum (rad) of the straight legs' angles from the slope's normal: 0 if both feet are on even ground.
 
     For legs that are alike, the sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays
     or lanes, measured from the vertical. (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from

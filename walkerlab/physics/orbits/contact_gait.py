@@ -97,7 +97,7 @@ def section_points(
 
 
 def solve_gait_on(pads: AdaptivePads, z: Floats, steps: int, rigidity: float = 0.0) -> Cycle | str:
-    """Solve for a gait of some steps near z (d,), or return why there is none."""
+    """Solve for a gait of `steps` steps near z (d,), or return why there is none."""
     gait = gait_near(pads, z, rigidity, CONTACT_EFFORT, steps)
     if isinstance(gait, NotConverged):
         if gait.singular:

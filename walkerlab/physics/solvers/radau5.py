@@ -349,7 +349,7 @@ def refresh(method: Radau5, system: Any) -> None:
 
 @kernel_part
 def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
-    """Choose the step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
+    """Choose the step after an accepted one: the smaller of the standard prediction and that of Gustafsson, (8.25)."""
     control = method.control
     if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
         predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety

@@ -97,7 +97,7 @@ class Tolerances:
 
 
 def share_counts(method: Any, clock: Any, counts: Any) -> Any:
-    """Return the method with the clock and counts of another method, so that both integrate the same walk in turns."""
+    """Return the method with the clock and counts of another method, so that both integrate the same walk in turn."""
     if isinstance(method, ScipyMethod):
         method.clock = clock
         method.counts = counts

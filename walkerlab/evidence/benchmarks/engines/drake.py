@@ -149,7 +149,10 @@ class DrakeRun(adapter.Simulation):
 
 
 def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Add bodies, joints and feet. Return joints in the order of coordinates, and geometries of feet and floor."""
+    """Add bodies, joints and feet.
+
+    Returns the joints in the order of the coordinates, and the geometries of feet and floor.
+    """
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -181,7 +184,7 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world with its freedoms, and return the joints."""
+    """Join a link to its parent by a hinge, or the base to the world by a joint for each freedom. Return the joints."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 
