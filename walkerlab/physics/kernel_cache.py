@@ -210,7 +210,7 @@ def cache_folder() -> Path:
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
-        # Only a new folder can raise their number above the limit.
+        # Only after a new folder was created can there be too many of them.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     # `_remove_unused` reads the time of the last use from the folder's time of change.
     os.utime(folder)

@@ -85,7 +85,7 @@ class MethodRow:
     tolerance: Annotated[float, Label("1", "relative tolerance")]
     outcome: Annotated[str, Label("1", "outcome")]
     error: Annotated[float | None, ERROR_LABEL]
-    against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
+    against: Annotated[str, Label("1", "method of the reference end state")]  # always another method
     within_reference: bool  # whether the error is below the reference's uncertainty
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "shortest run time", timing=True)]
@@ -305,7 +305,7 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
             for run in runs
             if run.method.split("-")[0] != family
             and run.method.startswith(("scipy", "cvode"))
-            and run.method != USER_SCRIPT  # the script has its own right-hand side
+            and run.method != USER_SCRIPT  # the script does not use the compiled right-hand side
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

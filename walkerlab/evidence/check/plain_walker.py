@@ -74,7 +74,7 @@ class PlainWalker:
     parts: tuple[LegPart, LegPart]  # parts of one leg: thigh and shank, or the whole leg and NO_PART
     knee: complex  # m, from hip to knee, or 0 for straight legs
     hip_mass: float
-    foot: complex  # m, from hip to the centre of the foot's arc, leg upright
+    foot: complex  # m, from hip to the centre of the foot's arc, for an upright leg
     radius: float
     gravity: float
     slope: float
@@ -171,7 +171,7 @@ class PlainWalker:
         for (phase, row, column), factor in self.signs.items():
             factors[phase][row, column] = factor
         for table in factors.values():
-            table[ROLLING] = table[STANCE]  # the stance leg's equation has both rows
+            table[ROLLING] = table[STANCE]  # both rows belong to the equation of the stance leg
         return factors
 
     def bodies(self, phase: str, state: Floats) -> Floats:
@@ -502,7 +502,7 @@ class Mistake(NamedTuple):
     what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
     of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
     first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest size: smaller ones hide in errors of a program
+    limits: tuple[float, float] = (0.0, 0.0)  # smallest size that is larger than errors of a program, and largest size
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:

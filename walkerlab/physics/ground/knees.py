@@ -75,7 +75,7 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     rates = x.size - int(whole.bodies)
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)
-    # A merged body shares the row of its group, whose column is that of the group's first body.
+    # Bodies of a group have the same row, and the column of a group is that of its first body.
     E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
     pairs = (whole.A[:n, :n], whole.B[:n, :n])
     arms = (whole.arm_x[:n], whole.arm_y[:n])

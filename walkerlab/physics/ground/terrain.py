@@ -25,7 +25,7 @@ class Terrain(NamedTuple):
     lanes: tuple[float, float]  # m, position along the slope of the centre of pad 0 in each foot's lane
     has_pads: bool  # whether the ground consists of pads, over whose edges a foot can trip; if not, it is a plane
     order_matters: bool  # whether a foot can touch only after it was ahead of the other foot while above the ground
-    heights: Any  # (footholds,) m above the slope, the start's foothold first; later footholds have the last height
+    heights: Any  # (footholds,) m above the slope, from the start on; all further footholds have the last height
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
@@ -91,7 +91,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether a foot in the air has ground below it, which may change on a plane where the order of the feet matters."""
+    """Whether a foot in the air has ground below it. That may change on a plane where the order of the feet matters."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

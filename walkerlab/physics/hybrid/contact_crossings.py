@@ -52,7 +52,7 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
         hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
     )
     away = values[stance * events.PER_FOOT + events.MATERIAL, node] - walk_state.touched[stance]
-    # Squared, so that one smooth function covers slides in both directions.
+    # The slide is squared, so that one smooth function covers both directions.
     values[events.SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
     for knee in range(2):
         values[events.EXTENSION + knee, node] = extension(form, knee, y)

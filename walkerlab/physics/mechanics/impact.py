@@ -80,7 +80,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         along = -R_before * y[at + n + rigid.STANCE]
         upward = 0.0
         if other_foot:
-            # The root's velocity above, differentiated with dF/dtheta = -U and dU/dtheta = F.
+            # The root's velocity above is differentiated with dF/dtheta = -U and dU/dtheta = F.
             for l in range(n):
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
                 upward += foot_F[l] * y[at + n + l] - foot_U[l] * y[at + l] * y[n + l]

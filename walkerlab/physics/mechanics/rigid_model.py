@@ -37,7 +37,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
     roles: Integers  # (n,) body k after a heel strike is body roles[k] before it
-    section: Integers  # (n + 1,) state indices of the d section coordinates, from the stance leg's angle on; then zeros
+    section: Integers  # (n + 1,) state indices of the d section coordinates, the stance leg's angle first, then zeros
     coordinates: int  # [d] number of coordinates on the section
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees

@@ -61,7 +61,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
         observer.last[walk, i] = y[i + 1]
     for k in range(observer.owner.size):
         a, b, c = y[1] - observer.points[k, 0], y[2] - observer.points[k, 1], y[3] - observer.points[k, 2]
-        # Strict, so that an attractor with a reach of zero captures nothing.
+        # The comparison is strict, so that an attractor with a reach of zero captures nothing.
         if a * a + b * b + c * c < observer.reach[k]:
             observer.attractor[walk] = observer.owner[k]
             return WALKED

@@ -37,7 +37,7 @@ SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
 SOLVED_RESIDUAL = 1e-14
 MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
-# following a gait from a vanishing slope
+# settings for following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # strides in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
 # Relative residual. It cannot be small, because a multiplier tends to 1 as the slope vanishes.
@@ -469,7 +469,7 @@ class Search:
                 self.keep(gait.z, RANDOM_START)
 
     def stands(self, z: Floats) -> bool:
-        # With both feet on the slope, this sum with the stance leg counted twice is the angle between the legs.
+        # With the stance leg counted twice, this sum is the angle between the legs if both feet are on the slope.
         return bool(abs(rigid.feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:

@@ -28,7 +28,7 @@ METHOD = "radau5"
 LIMIT_BUDGET = 50_000_000
 GAIT_TOLERANCE = 1e-10
 CHECK_TOLERANCE = 1e-11
-# tolerances of timed walks, and of walks that check their numerical error
+# tolerances of timed walks, and of the walks that show their numerical error
 WALK_TOLERANCE = 1e-8
 WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance

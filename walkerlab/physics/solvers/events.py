@@ -64,7 +64,7 @@ def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int =
 def sampling(degree: int) -> tuple[Any, Any]:
     """Compute the nodes (degree + 1,) and the matrix that maps values at the nodes to Bernstein coefficients."""
     size = degree + 1
-    # Chebyshev points: equidistant ones would amplify rounding errors at this degree.
+    # These are Chebyshev points, because equidistant ones would amplify rounding errors at this degree.
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
     constant = np.array([1.0])
@@ -103,8 +103,8 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
         if high <= after or signs == 0:
             top -= 1
             continue
-        # By Descartes' rule of signs, one change of sign means exactly one crossing, more changes only bound their
-        # number.
+        # By Descartes' rule of signs, one change of sign means exactly one crossing. More changes only bound the number
+        # of crossings.
         if (signs == 1 and low >= after) or high - low < MIN_PIECE:
             top -= 1
             # The removed piece stays in memory above the top of the stack.
