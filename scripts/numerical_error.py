@@ -30,7 +30,7 @@ LEAST = 1e-11  # s or m; smaller errors are rounding, or the last digits of an e
 
 
 def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
-    """Return summaries and counts of right-hand sides of the walk at each tolerance, from the default to the tightest."""
+    """Return summaries and counts of right-hand sides of the walk at each tolerance, beginning with the default."""
     config, scene = scene_of(drawn)
     walks = [ours_at(scene, config, drawn, steps, tighter) for tighter in TIGHTER]
     return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]

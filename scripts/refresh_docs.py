@@ -225,7 +225,7 @@ PARTS: dict[str, Callable[[Results], str]] = {
 
 
 def refreshed(text: str, results: Results) -> str:
-    """Return a document with its generated parts brought up to date. Raises KeyError for a part that has no generator."""
+    """Return a document with its generated parts brought up to date. Raises KeyError for a part without a generator."""
     return PART.sub(lambda found: found[1] + PARTS[found[2]](results) + found[4], text)
 
 
