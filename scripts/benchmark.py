@@ -122,7 +122,7 @@ class Stopwatch:
 def cheapest(
     trial: Trial, reference: Reference, method: str, level: float, watch: Stopwatch, ladder: Sequence[float]
 ) -> Timed | None:
-    """Return the run of a method at the loosest tolerance with an error of at most `level`, or None if there is none."""
+    """Return the run of a method at the loosest tolerance whose error is at most `level`, or None if there is none."""
     for tolerance in ladder:
         walk = trial.prepare(method, tolerance, BUDGET)
         run = walk()

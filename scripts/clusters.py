@@ -237,7 +237,7 @@ def a_cancelled_job_is_run_again(folder: Path) -> None:
 
 
 def a_nanny_kills_only_the_greedy_point(folder: Path) -> None:
-    """Check that only seed 29 fails, which needs more memory than its worker may have, so that Dask's nanny kills it."""
+    """Check that only seed 29 fails: it needs more memory than its worker may have, so Dask's nanny kills it."""
     import dask
 
     # Dask divides this limit among its workers as if it were the machine's memory. Linux ignores it.

@@ -223,7 +223,7 @@ class Motion:
             self.frames[part] = (x, y, turn, math.cos(turn), math.sin(turn), *u[i : i + 3])
 
     def of(self, marker):
-        """Return position, angle, velocity and angular velocity of a marker, and its lever from the origin of its part."""
+        """Return position, angle, velocity and angular velocity of a marker, and its lever from the part's origin."""
         if (known := self.known.get(marker)) is None:
             m = self.dataset.markers[marker]
             x, y, turn, cos, sin, vx, vy, spin = self.frames[m.part]

@@ -76,7 +76,7 @@ class Legs:
 
 
 def rates(legs, state):
-    """Return the derivative of (swing angle, stance angle, their rates), from Lagrange's function written out by hand."""
+    """Return the derivative of (swing angle, stance angle, their rates) from Lagrange's function, derived by hand."""
     a, b, da, db = state
     m, M, c, I, R, g = legs.mass, legs.hip, legs.below, legs.inertia, legs.radius, legs.gravity
     d = legs.length - R  # from the foot's centre to the hip

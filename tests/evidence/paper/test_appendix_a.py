@@ -1,4 +1,4 @@
-"""Compare the printed equations with Lagrange's equations, which are derived here, and both with the compiled physics."""
+"""Compare the printed equations with Lagrange's equations, derived here, and both with the compiled physics."""
 
 import math
 

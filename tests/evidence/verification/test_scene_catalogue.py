@@ -1,4 +1,4 @@
-"""Tests of the extreme cases of a scene: which cases a walker has, and how they are measured for every kind of walker."""
+"""Tests of the extreme cases of a scene: which cases each walker has, and how cases of every walker are measured."""
 
 from pathlib import Path
 
