@@ -43,7 +43,9 @@ def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
 
 
 def test_error_bar_of_a_strike_just_before_the_start_contains_its_distance(tmp_path):
-    """The strike is 9 ms before the first sample, where it may be found."""
+    """The strike is 9 ms before the first sample. If it is found at that sample, its error bar must reach back that
+    far.
+    """
     crops = campaign()
     crop = crops.Crop(1.416340339244594, 4.3245826090380675, 30.0, 1.7453e-3, -1.0)
     # In these three films of 300 the first sample counts as a strike.

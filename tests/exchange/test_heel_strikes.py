@@ -1,4 +1,4 @@
-"""Tests of heel strikes in recordings that begin or end anywhere, are noisy, or have swapped, rotated or biased angles."""
+"""Find heel strikes in recordings that begin or end anywhere, are noisy, or have swapped, rotated or biased angles."""
 
 import functools
 import math

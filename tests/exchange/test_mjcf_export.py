@@ -261,7 +261,9 @@ def test_damping_of_each_knee_is_a_property_of_its_joint():
 
 
 def test_exported_script_reacts_to_the_state_and_not_to_time(tmp_path):
-    """The walk starts with 1.02 times the rates of the gait, so touches and locks come at other times than in our walk."""
+    """The walk starts with 1.02 times the rates of the gait, so touches and locks do not come at the times of
+    our walk.
+    """
     walk = walk_of(tmp_path, *KNEED)
     walk.data.qvel *= 1.02
     periods, _ = steps_of(walk, 2)
@@ -301,7 +303,7 @@ def test_knee_lock_in_mujoco_equals_our_plastic_impact(walker, tmp_path):
 
 
 def test_knee_stop_in_mujoco_has_the_same_torque_as_ours():
-    """MuJoCo scales a limit by `dof_invweight0`. The exported stiffness allows for this, so that the torques are equal."""
+    """The exported stiffness and damping must allow for `dof_invweight0`, by which MuJoCo scales a limit."""
     export, model = export_of(*STOPPED), model_of(*STOPPED)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -285,7 +285,7 @@ def test_frame_rate_is_rejected_for_a_table_of_steps(tmp_path):
 
 
 def deeplabcut(places, likelihood, individuals=()):
-    """Return a table in the layout of DeepLabCut: three header rows, or four with individuals, and frames as the index."""
+    """Return a table in DeepLabCut's layout: three header rows, or four with individuals, and frames as the index."""
     names = [f"{part},{part},{part}" for part in ("hip", "foot1", "foot2")]
     head = [f"scorer{',net' * 9}"]
     head += [f"individuals{f',{each}' * 9}" for each in individuals]

@@ -18,7 +18,7 @@ LOCK = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
 
 
 def sign_of(row, column, phase):
-    """Return the name of the term in this row and column, and the sign that plants a mistake in it."""
+    """Return the words that name a wrong sign of this term, and the field of `Knees` that plants it."""
     words = f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign {phase}"
     return words, {"signs": {(row, column, phase): -1.0}}
 

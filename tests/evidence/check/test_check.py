@@ -97,8 +97,8 @@ def test_unexplained_state_of_a_kneed_walker_raises_no_error():
 
 
 def test_mistake_is_found_in_conventions_that_are_not_stated():
-    """The script that gave the state has a wrong strike, and its second angle, which is relative, is printed as
-    absolute.
+    """The script that computed the state has a wrong strike, and its relative second angle is taken for an absolute
+    one.
     """
     config = load(PUBLISHED / "passivewalker-2009.yaml", ["check.angles.second=absolute"]).config
     (explanation,) = check_gait(config)["explanations"]

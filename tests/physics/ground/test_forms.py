@@ -1,4 +1,4 @@
-"""Check that a locked leg moves in the same way in both forms: as one body, and as two bodies that are held together."""
+"""Check that a locked leg moves in the same way in both forms: as one body, and as two bodies held together."""
 
 import numpy as np
 import pytest

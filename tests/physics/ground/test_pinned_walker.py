@@ -68,7 +68,8 @@ def test_derivatives_of_a_pinned_stance_are_correct_with_the_other_foot_in_the_g
     angle, depth, swing, stance, foot
 ):
     system = pinned(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
-    # The legs end at the centres of the balls, so the swing foot lies deeper by as much as its ball is lower.
+    # The legs end at the centres of the balls. The swing foot is as deep in the ground as its centre is below the
+    # hinge.
     other = -math.acos(math.cos(angle) + depth / 0.99)
     legs = np.array([[other, angle], [swing, stance]])[:, :: 1 if foot == 1 else -1]
     legs[0] -= system.form.slope

@@ -22,7 +22,7 @@ feet = st.sampled_from([0, 1])
 
 
 def walked_on(pitch):
-    """Return lanes as a walk lays them. Foot 1, which stands first, is at 0, and the other foot is one pitch behind it."""
+    """Return lanes as a walk lays them. Foot 1, which stands first, is at 0, and the other foot one pitch behind it."""
     return checkerboard(pitch, (-pitch, 0.0))
 
 

@@ -289,8 +289,8 @@ def rate(walker, now, t, y):
 
 @inner
 def reaction(walker, now, y):
-    """Return how fast (1/s) the ground reacts to the velocity of a foot, and a foot crosses the depth where damping
-    sets in.
+    """Return the largest rate (1/s) at which the ground reacts to the velocity of a foot, or at which a foot crosses
+    the depth where damping sets in.
     """
     n, fastest = walker.inertias.size, 0.0
     for foot in range(2):
@@ -345,7 +345,7 @@ def stored(walker, foot, level, y):
 
 @njit
 def energy(walker, has_ground, levels, y):
-    """Return the sum (J) of kinetic energy, potential energy above the first foothold, and energy stored in the ground."""
+    """Return the sum (J) of kinetic energy, potential energy above the first foothold, and energy in the ground."""
     n = walker.inertias.size
     total = 0.0
     for i in range(walker.masses.size):
@@ -671,7 +671,7 @@ def of_centre(walker, y):
 
 
 def start(walker, angles, rates, pinned=False):
-    """Return the state in which foot 1 just touches at the origin and rolls without slip, or is pinned at its centre."""
+    """Return the state in which foot 1 just touches at the origin and rolls, or is pinned at its centre."""
     n = walker.inertias.size
     y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates, [0.0, 0.0]]).astype(float)
     x, height, slip, vertical_velocity, centre = foot_at(walker, 1, y)
