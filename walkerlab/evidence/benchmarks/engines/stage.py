@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab import __version__
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_omissions, plain_power
 from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene, OwnProcess, TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
@@ -84,7 +84,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     Raises NoAnswer if no engine is installed, or if our walk ends too early.
     """
     engines = installed()
-    findings = EngineFindings(left_out=[*missing_engines(), *pinning_left_out(config, "engines")])
+    findings = EngineFindings(left_out=[*missing_engines(), *pinning_omissions(config, "engines")])
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
