@@ -32,7 +32,7 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # number of quantities at the beginning that follow from a single stride
+STEP_QUANTITY_COUNT = 3  # number of quantities, listed first, that follow from a single stride
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
