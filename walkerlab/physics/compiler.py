@@ -108,7 +108,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             files_in_use.add(name)
 
     def file_name(self, signature: Any) -> str:
-        """Return the cached file's name for these argument types. It contains a hash of the user's code, if any."""
+        """Return the cached file's name for these argument types, with a hash of what the folder's name leaves out."""
         function = self.py_func
         location = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""

@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
 
-SAME_ROUTE: Final = 1e-10  # the two routes agree if they differ by less than this, with L and g of 1
+SAME_ROUTE: Final = 1e-10  # both models agree if they differ by less than this, with L and g of 1
 SAME_GAIT: Final = 1e-6  # starts that differ by less than this belong to the same gait
 SMALL_VALUE: Final = 1e-3  # differences are relative for printed values above this, and absolute below
 GAIT_VALUES: Final = (

@@ -227,7 +227,7 @@ class PlainWalker:
 
 
 def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
-    """Return the angles and then the rates of all bodies, from coordinates at which the swing leg is straight."""
+    """Convert coordinates with a straight swing leg to the angles and then the rates of all bodies."""
     if not walker.kneed:
         return coordinates[:4]
     shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
@@ -235,7 +235,7 @@ def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
 
 
 def coordinates(walker: PlainWalker, state: Floats) -> Floats:
-    """Return the coordinates just after a heel strike from the state of all bodies."""
+    """Convert the state of all bodies just after a heel strike to coordinates."""
     n = len(state) // 2
     return np.concatenate((state[:2], state[n : n + 2 + int(walker.kneed and walker.free_at_strike)]))
 
@@ -551,7 +551,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield the velocity terms in the equations of motion whose signs may be wrong together, with a description."""
+    """Yield groups of velocity terms in the equations of motion whose signs may be wrong together, and a description."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}

@@ -208,7 +208,10 @@ def make_gradient(value: float, error: float) -> Gradient:
 
 
 def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) -> Gradient:
-    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps."""
+    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps.
+
+    change, error  (d, d) derivative of A with respect to the parameter, and its error
+    """
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))

@@ -227,7 +227,7 @@ def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """Return the largest step (s) that gives three correct digits of the last period, by experiment and integrator."""
+    """Return the largest step (s) with three correct digits of the last period, by experiment and name of series."""
     # Under our law the digits are those of the reference. Native contact has no reference but the finest run.
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
@@ -255,7 +255,7 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
 
 
 def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
-    """Return the effect of the last refinement of each series, by experiment and integrator.
+    """Return the effect of the last refinement of each series, by experiment and name of the series.
 
     Under our law it is the factor by which the error fell, and on native contact the change of the period (s).
     """
