@@ -551,7 +551,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield groups of velocity terms whose signs may be wrong together in the equations of motion, with descriptions."""
+    """Yield groups of velocity terms in the equations of motion that may share a wrong sign, and describe them."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}
