@@ -1,4 +1,4 @@
-"""Tests of the part of a config that each stage gets, and of the key made from it."""
+"""Tests of the slice of a config that each stage reads, and of the key computed from it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class ToleranceConfig(Protocol):
 
 
 class ToleranceThenStart(StartConfig, ToleranceConfig, Protocol):
-    """A type whose bases are listed in the opposite order of their keys."""
+    """A type that lists its bases in the opposite order of their keys."""
 
 
 class StartThenTolerance(ToleranceConfig, StartConfig, Protocol):
@@ -63,7 +63,7 @@ class MisspeltConfig(Protocol):
 
 @pytest.fixture
 def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Let `reads` import the blocks of the config at run time, and not for mypy alone."""
+    """Let `reads` import the blocks of the config at run time, as some stages do, instead of only for mypy."""
     blocks = (Basin, Case, Contact, Continuation, Design, Footholds, Identify, PushOff, Robustness)
     for block in blocks:
         monkeypatch.setattr(reads, block.__name__, block, raising=False)

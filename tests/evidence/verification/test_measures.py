@@ -1,4 +1,4 @@
-"""Check that the measures notice errors."""
+"""Check that the measures detect errors."""
 
 import math
 from dataclasses import replace

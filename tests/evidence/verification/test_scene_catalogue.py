@@ -1,4 +1,4 @@
-"""Tests of the extreme cases of a scene: their range for each walker, and the measures for every kind of walker."""
+"""Tests of the extreme cases of a scene: which cases each walker has, and how cases of every walker are measured."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ def cases_of(config, gait=GAIT):
 
 
 def start_of(config):
-    """Return a moving start: legs apart on the slope, knees straight and the torso on the bisector."""
+    """Return a start in motion, with both feet on the slope, straight knees and the torso on the bisector."""
     model = rigid_walker(config, "corrected")
     bodies = len(model.zero_state) // 2
     stance = 0.2
@@ -136,7 +136,7 @@ def test_scaling_a_walker_up_and_down_again_restores_it(name, sets):
 
 
 def numbers_of(block):
-    """Every number of a block and the blocks in it."""
+    """Yield every number of a block and of the blocks in it."""
     inner = [numbers_of(value) if isinstance(value, dict) else value for value in block.values()]
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 

@@ -26,7 +26,7 @@ BAD = replace(GOOD, name="bad", outcome="fell")
 
 
 def known(name, value):
-    """A known problem as its stage prints it."""
+    """Return a problem with a known answer as the stage prints it."""
     answer = Known(name, "time, s", value, 1.0, "closed form", 1e-6, "tolerance", 0.1)
     return {**asdict(answer), "error": answer.error, "ok": answer.ok}
 
