@@ -11,7 +11,7 @@ from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
 from walkerlab.evidence.paper.appendix_a import impact
 from walkerlab.evidence.paper.walker import compass
-from walkerlab.evidence.verification.catalogue import config_of, package_cases, scaled, to_twin
+from walkerlab.evidence.verification.catalogue import config_of, package_cases, scale_config, to_twin
 from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.starts import (
     RigidMasses,
@@ -89,7 +89,7 @@ def test_measure_that_is_nan_or_infinite_fails():
 def test_scaling_a_walker_to_another_size_and_back_restores_it():
     by = to_twin(PAPER)
     back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
-    again = scaled(scaled(PAPER, by), back)
+    again = scale_config(scale_config(PAPER, by), back)
     assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
     one, other = again.contact.to_si(), PAPER.contact.to_si()
@@ -136,7 +136,9 @@ def test_driven_walkers_of_two_sizes_are_equal_at_unit_size(name):
     hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "hinge_law")
     sets = (*hip, "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config
-    own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))
+    own, twins = (
+        unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scale_config(config, to_twin(config)))
+    )
     for field in own.dtype.names:
         np.testing.assert_allclose(twins[field], own[field], rtol=1e-12, atol=1e-15, err_msg=field)
 

@@ -150,12 +150,12 @@ def to_twin(config: RigidConfig) -> Units:
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
-def scaled_block(block: B, by: Units, special: Mapping[str, float]) -> B:
+def scale_block(block: B, by: Units, special: Mapping[str, float]) -> B:
     """Return the block with each value scaled according to the unit of its key, or by its entry in `special`."""
 
     def value(quantity: Any, unit: float) -> Any:
         if isinstance(quantity, Block):
-            return scaled_block(quantity, by, special)
+            return scale_block(quantity, by, special)
         if isinstance(quantity, tuple):
             return tuple(value(item, unit) for item in quantity)
         return quantity * unit if isinstance(quantity, float) and unit != 1.0 else quantity
@@ -167,15 +167,15 @@ def scaled_block(block: B, by: Units, special: Mapping[str, float]) -> B:
     return block.model_copy(update=values)
 
 
-def scaled(config: Config, by: Units) -> Config:
+def scale_config(config: Config, by: Units) -> Config:
     """Return the config of a similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
     # A law of an extension may give its parameters units of its own. Hip and knees name them alike.
     law_units = hinge_law_of(config.walker).units(by.energy, by.time)
-    walker = scaled_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True)))
+    walker = scale_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True)))
     changes: dict[str, object] = {
         "walker": walker,
         "gravity_m_s2": config.gravity_m_s2 * by.length / by.time**2,
-        "push_off": scaled_block(config.push_off, by, {}),
+        "push_off": scale_block(config.push_off, by, {}),
     }
     if not isinstance(config.start, str):
         state = state_of(config.start)

@@ -97,13 +97,13 @@ class RuleFollower:
         self.turn: Turn | None = None
         self.watches = True
         self._feet: Feet
-        self._see(scene, q, v)
+        self._switch_to(scene, q, v)
         # Both feet stand on the ground. Rounding may put them slightly above it, which would count as a lift.
         first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
         self._feet = first, second
         self._edges = [edges_under(scene.ground.terrain, foot, self.walk_state.cells[foot]) for foot in range(2)]
 
-    def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
+    def _switch_to(self, scene: EngineScene, q: Floats, v: Floats) -> None:
         """Switch to the model of a scene, in the state with coordinates q and velocities v."""
         self.scene = scene
         self.probe = WalkerProbe(scene, self._ground, self.walk_state)
@@ -197,7 +197,7 @@ class RuleFollower:
         self.turn = None
         scene = self.scene.lock_knees(walk_state.knee)
         q, v = scene.from_base(tuple(y.tolist()))
-        self._see(scene, q, v)
+        self._switch_to(scene, q, v)
         return q, v
 
     def _end(self, outcome: int) -> None:
