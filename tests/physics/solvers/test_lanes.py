@@ -1,4 +1,4 @@
-"""Check that code compiled for lanes does in each lane what it does for a float."""
+"""Check that code compiled for lanes computes in each lane what it computes for a float."""
 
 import math
 import subprocess
@@ -81,7 +81,7 @@ print((theirs() - before)["<built-in function add>"])
 def test_importing_lanes_registers_no_global_operators():
     done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 0  # of those that are looked at
+    assert int(done.stdout) > 0  # makes sure that the script looked at some operators
 
 
 def test_lane_arithmetic_equals_float_arithmetic():
