@@ -54,7 +54,7 @@ class MethodRun:
     walls_s: tuple[float, ...]
 
     def pack(self) -> Numbers:
-        """Return the numbers that `unpack` takes, for a checkpoint."""
+        """Convert the run to numbers for a checkpoint. `unpack` converts them back."""
         run = self.result
         counts = run.rhs_evaluations, run.accepted, run.rejected
         state = run.state.tolist()
@@ -85,7 +85,7 @@ class MethodRow:
     tolerance: Annotated[float, Label("1", "relative tolerance")]
     outcome: Annotated[str, Label("1", "outcome")]
     error: Annotated[float | None, ERROR_LABEL]
-    against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
+    against: Annotated[str, Label("1", "method of the reference end state")]  # always another method
     within_reference: bool  # whether the error is below the reference's uncertainty
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "shortest run time", timing=True)]
@@ -129,7 +129,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
-    # The first walk also loads data into caches, which does not matter for a long walk, so only then does it count.
+    # The first walk also loads data into caches. It counts only if it is so long that this does not matter.
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -187,7 +187,7 @@ OMISSION_OFF_COMPASS = {
     "why": "only the compass has it",
     "saves": "a minute",
 }
-START_RATE_FACTOR = 0.98  # factor on the velocities of the gait: on the gait itself, all steps would be the same
+START_RATE_FACTOR = 0.98  # factor applied to the gait's velocities, because on the gait itself all steps are the same
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
@@ -237,7 +237,7 @@ def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 
 
 def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
-    """Yield the walks for the measurement: rigid, on compliant ground and, for the compass, near the rigid limit."""
+    """Yield the walks to measure: in the rigid model, on compliant ground and, for a compass, on near-rigid ground."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
     start = scale_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
@@ -280,7 +280,7 @@ def summarise(
 
 
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Return for each method the fastest run on a scene with an error of at most `level`, the fastest method first."""
+    """Return the fastest run of each method on a scene with an error of at most `level`, the fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
@@ -305,7 +305,7 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
             for run in runs
             if run.method.split("-")[0] != family
             and run.method.startswith(("scipy", "cvode"))
-            and run.method != USER_SCRIPT  # the script has its own right-hand side
+            and run.method != USER_SCRIPT  # the script does not use the compiled right-hand side
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

@@ -287,7 +287,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
         "state_after_step": checked.convention.write(walker, plain.full_state(walker, step.after)),
     }
     if checked.convention.origin == "vertical" and checked.convention.instant == "after-strike":
-        # both feet stand on the slope that the legs' angles have
+        # the slope on which both feet stand with the legs at these angles
         answer["slope_rad"] = walker.slope - 0.5 * walker.feet_apart(start)
     return answer
 
@@ -329,9 +329,9 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
 
 
 def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
-    """Return the change of energy (J) from the printed state just after a strike to that just before the next one.
+    """Return the change of energy (J) between the printed state just after a strike and the one just before the next.
 
-    Return nothing if one of them is not printed.
+    The result is empty if one of them is not printed.
     """
     walker = checked.walker
     if walker.kneed or checked.convention.instant != "after-strike":
@@ -361,7 +361,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
-    """Compare both routes: in the plain model, the gait of the compiled model must return to itself after a step."""
+    """Compare both models: in the plain model, the gait of the compiled model must return to itself after a step."""
     unit = plain.scales(gait.walker, len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())

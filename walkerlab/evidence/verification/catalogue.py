@@ -83,7 +83,7 @@ def config_of(case: Case) -> Config:
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """Return the cases of a scene with their configs, for the rigid model and, if the scene has contact, for both.
+    """Return the cases of a scene with their configs, for both models or, without contact, only for the rigid one.
 
     config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """

@@ -1,4 +1,4 @@
-"""Judgement of cases, and ordinary methods on the same cases.
+"""Judge the walks of cases, and try ordinary methods on the same cases.
 
 Each walk is repeated with a ten times tighter tolerance, with another method and for a scaled twin of the walker.
 

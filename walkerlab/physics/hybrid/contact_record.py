@@ -47,7 +47,7 @@ RADAU_WEIGHTS = np.array(
 
 @pass_by_reference
 class Tangent(NamedTuple):
-    """Derivative Phi of the state, and workspace. `n` is the size of the free walker's state with all bodies."""
+    """Derivative Phi of the state with respect to the start, and workspace. The free walker's state has n values."""
 
     # If locked knees or a pinned foot reduce the state, only the first rows are used.
 
@@ -99,7 +99,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
     """Compute the Jacobian at the solver step's end, extrapolated from two states shortly before the end."""
-    # A solver step up to a switching point of the force law may end on either side of it, where the Jacobian jumps.
+    # The Jacobian jumps at a switching point of the force law, and a solver step to that point may end on either side.
     near = min(0.25, SIDE_OFFSET / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
         jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])
@@ -178,7 +178,7 @@ CONTACT_TALLY = record_type(ContactTally, {})
 
 @pass_by_reference
 class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk. Each is skipped if not requested."""
+    """Samples, energy balance and tangent of a walk. Those that are not requested are skipped."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples

@@ -321,7 +321,7 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats)
     work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
     if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
         return work
-    # If the knees have dampers, the hip has none, so all work that is not done by the torque is theirs.
+    # If the knees have dampers, the hip has none, so all work that the torque does not do is done by the knees.
     return work._replace(hip=work.hip_torque, knees=work.hip - work.hip_torque)
 
 

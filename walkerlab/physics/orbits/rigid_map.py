@@ -216,10 +216,10 @@ class RigidStepper(local):
         start: Floats | None = None,
         observer: Observer | None = None,
     ) -> Steps:
-        """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
+        """Walk from z (d,). The derivative, a third of the work, is skipped if `derived` is false.
 
         floor  rises and nearest landing, as in `HeelStrikes`, in units of the walker. The default is even ground
-        start  (2 n,) state off the section from which to walk instead of z, without a derivative
+        start  (2 n,) state from which to walk instead of z, without a derivative. It need not lie on the section
         """
         d, size = section.basis.shape
         method, columns = (self.memory.varied, d) if derived else (self.plain, 0)
@@ -275,7 +275,7 @@ class RigidStepper(local):
         return StepTangents(before[0], rates, *(each / TANGENT_SCALE for each in by))
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
-        """Run Newton's method from starts (starts, d), overwritten with the last points tried.
+        """Run Newton's method from `starts` (starts, d), which are overwritten with the last points tried.
 
         gaits  known gaits, as section coordinates (d,) and derivative (d, d) of the step map
 
@@ -305,7 +305,7 @@ def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits,
 
 @kernel_part
 def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
-    """Run Newton's method from z (d,), overwritten with the last point tried.
+    """Run Newton's method from z (d,), which is overwritten with the last point tried.
 
     A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
     The search stops if a known gait is close and one correction with its derivative would almost reach it.

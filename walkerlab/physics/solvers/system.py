@@ -1,6 +1,6 @@
 """Interface of continuous systems: functions whose bodies are chosen by the type of the system.
 
-A system is a NamedTuple that registers a body for each of these functions; integrators call nothing else. States are
+A system is a NamedTuple that registers a body for each of these functions. Integrators call nothing else. States are
 arrays (n,) in the caller's memory, which `derivative` and `jacobian` never write.
 """
 

@@ -104,7 +104,7 @@ class RuleFollower:
         self._edges = [edges_under(scene.ground.terrain, foot, self.walk_state.cells[foot]) for foot in range(2)]
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Follow the model of a scene from coordinates q and velocities v on."""
+        """Switch to the model of a scene, in the state with coordinates q and velocities v."""
         self.scene = scene
         self.probe = WalkerProbe(scene, self._ground, self.walk_state)
         self._feet = self.probe.feet(q, v)
@@ -281,7 +281,7 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
             low = middle
         else:
             high = middle
-    # Return the end on the far side of zero, where the foot has certainly crossed.
+    # At this end of the bracket the foot has certainly crossed zero.
     return high
 
 
