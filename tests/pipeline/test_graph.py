@@ -193,7 +193,7 @@ COMPASS = ["equations=as-printed", "slope_deg=1"]
         ("simulate", "paper", [], set()),
         ("simulate", "paper", COMPASS, {LAW}),
         ("simulate", "simplest", COMPASS, {LAW}),
-        ("fixedpoint", "paper", [], {LAW}),  # the paper's walker has a gait with each set of equations
+        ("fixedpoint", "paper", [], {LAW}),  # The paper's walker has a gait for each set of equations.
         ("fixedpoint", "simplest", [], set()),
         ("fixedpoint", "kneed", [], set()),
         ("contact-sim", "paper", ["contact.terrain=plane"], set()),
