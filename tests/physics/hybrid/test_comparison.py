@@ -128,7 +128,7 @@ def test_touch_between_samples_is_extrapolated_from_before_the_impact():
     assert abs(smeared + 1.0).min() > 0.1
 
 
-def test_walk_with_samples_at_its_heel_strikes_is_unchanged():
+def test_samples_at_heel_strikes_need_no_extrapolation():
     motion = walk()
     assert add_strike_samples(motion) is motion
 

@@ -87,7 +87,7 @@ def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE, method="radau5
     ],
     ids=["feet pass as the foot lifts", "stance foot bounces", "law switches as the foot lifts"],
 )
-def test_walk_on_after_mid_swing_ground_agrees_with_the_reference(sets, periods):
+def test_walk_on_ground_that_carries_after_mid_swing_agrees_with_the_reference(sets, periods):
     walk = from_the_gait(*sets, AFTER_MID_SWING, steps=len(periods))
     assert walk.outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.periods_s, periods, atol=6e-7)

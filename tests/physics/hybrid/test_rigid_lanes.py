@@ -83,7 +83,7 @@ def test_random_starts_end_the_same_way_in_lanes_as_in_single_walks(walker):
     assert {Outcome.FELL, Outcome.REJECTED} <= set(fates.outcome.tolist())
 
 
-def test_starts_near_a_gait_walk_equally_in_lanes_and_in_single_walks():
+def test_starts_near_a_gait_give_the_same_walks_in_lanes_and_one_by_one():
     generator = np.random.default_rng(3)
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
@@ -115,7 +115,7 @@ def test_overflow_ends_the_walk():
     assert Outcome(int(fates.outcome[0])) in (Outcome.SOLVER_FAILED, Outcome.BUDGET_EXHAUSTED)
 
 
-def test_driven_walks_are_equal_in_lanes_and_in_single_walks():
+def test_driven_walks_in_lanes_equal_single_walks():
     driven = assembled(ONE_DEGREE).changed(hip=(5.0, 0.1, 0.5), push_off=1.0)
     starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
     fates, strikes = model_in_lanes(driven, starts, 1e-10)

@@ -503,7 +503,7 @@ def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
 
 
-def test_a_complex_pair_gives_a_direction_in_its_own_plane():
+def test_direction_of_a_complex_pair_lies_in_the_plane_of_the_pair():
     """The direction lies in that plane even if another multiplier equals the real part of the pair."""
     pair = 1.2 * np.exp(1j)
     basis = np.random.default_rng(0).normal(size=(3, 3))

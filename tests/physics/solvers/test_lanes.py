@@ -136,7 +136,7 @@ def test_equations_of_motion_in_a_lane_equal_those_of_one_walker():
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3])
-def test_explicit_two_leg_equations_equal_the_rigid_model(radius):
+def test_written_out_equations_of_two_legs_equal_the_rigid_model(radius):
     model = MODEL.changed(radius=radius)
     y = np.random.default_rng(3).uniform(-2.0, 2.0, (4, WIDTH))
     out, expected = np.zeros((4, WIDTH)), np.zeros((4, WIDTH))

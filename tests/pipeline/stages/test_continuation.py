@@ -236,7 +236,7 @@ def test_unit_of_a_contact_key_is_that_of_the_config(name, unit):
     assert parameter_of("walker.hip_mass_kg", config).unit == "kg"
 
 
-def test_derived_values_follow_their_key():
+def test_values_derived_from_a_key_change_with_it():
     own = config("walker={leg_length_m: 1.0}")
     longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
     assert longer.walker.foot_to_mass_m == 0.7  # The default is half of the length.

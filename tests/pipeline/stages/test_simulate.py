@@ -234,7 +234,7 @@ def test_mid_step_start_is_simulated_unchanged():
 
 
 @pytest.mark.parametrize("name", ["paper", "torso", "kneed-round-feet"])
-def test_walk_continues_equally_from_any_mid_step_state(name):
+def test_walk_continues_the_same_way_from_any_mid_step_state(name):
     config = load(Path(name), ["strides=2"]).config
     gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     scene = rigid_scene(config, Footholds(), ("states",))
