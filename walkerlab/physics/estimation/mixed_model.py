@@ -231,12 +231,12 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return the information, the step to the most likely unknowns, the sum of squares there, and the logarithm of the
-    determinant of the information.
+    """Return the information, the step to the most likely unknowns, the sum of squares there, and a log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
-    The determinant is computed from those eigenvalues that exceed rounding errors.
+    The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
+    errors.
     """
     information = reduced[..., 1:, 1:]
     score = reduced[..., 1:, 0]
@@ -260,7 +260,7 @@ def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Flo
 def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Fewer disturbances are a simpler explanation, so another one is added only if it raises the likelihood enough.
+    Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
     """
     best = start
     best_likelihood = -math.inf
