@@ -22,6 +22,7 @@ from walkerlab.evidence.verification.starts import (
 )
 from walkerlab.evidence.verification.verdict import Measure, finite
 from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.mechanics.hinges import HINGE_LAWS, HingeTorque, SpringDamper, hinge_energy, hinge_torque
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
 from walkerlab.physics.orbits.similarity import Units, unit_walker
@@ -93,6 +94,41 @@ def test_scaling_a_walker_to_another_size_and_back_restores_it():
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
     one, other = again.contact.to_si(), PAPER.contact.to_si()
     assert vars(one) == pytest.approx(vars(other))
+
+
+class QuadraticDamper(SpringDamper):
+    """A hinge law whose damping has a unit of its own: N m s^2/rad^2."""
+
+    @classmethod
+    def units(cls, energy, time):
+        return cls(energy, energy * time**2, energy)
+
+
+@hinge_torque.case(QuadraticDamper)
+def quadratic_torque(law, angle, rate):
+    elastic, damping = law.stiffness * angle, law.damping * abs(rate)
+    return HingeTorque(elastic + damping * rate - law.torque, elastic, law.stiffness, 2.0 * damping)
+
+
+@hinge_energy.case(QuadraticDamper)
+def quadratic_energy(law, angle):
+    return 0.5 * law.stiffness * angle * angle
+
+
+def test_twin_of_a_walker_scales_hinge_parameters_by_the_units_of_their_law(monkeypatch):
+    monkeypatch.setitem(HINGE_LAWS.laws, "quadratic", QuadraticDamper)
+    legs = "walker.leg_2={knee: {damping_N_m_s_per_rad: 0.03}}"
+    config = load(Path("kneed"), ["walker.hip.spring_N_m_per_rad=0.2", "walker.knee.damping_N_m_s_per_rad=0.02", legs])
+    walker = config.config.walker
+    law = {"hip": walker.hip.model_copy(update={"hinge_law": "quadratic"})}
+    config = config.config.model_copy(update={"walker": walker.model_copy(update=law)})
+    by = to_twin(config)
+    twin = scaled(config, by)
+    assert twin.walker.knee.stop_damping == pytest.approx(walker.knee.stop_damping * by.energy * by.time)
+    own, twins = (unit_walker(rigid_walker(each))[0] for each in (config, twin))
+    assert np.count_nonzero(own["laws"]) == 2
+    np.testing.assert_allclose(twins["laws"], own["laws"], rtol=1e-12)
+    np.testing.assert_allclose(twins.exchanged["laws"], own.exchanged["laws"], rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])

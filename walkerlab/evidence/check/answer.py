@@ -340,7 +340,7 @@ def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
     end = checked.printed_state("state_before", right.step.before)
     if start is None or end is None:
         return {}
-    return {"energy_drift_J": walker.energy(end[0]) - walker.energy(start[0])}
+    return {"energy_drift_J": plain.energy(walker, end[0]) - plain.energy(walker, start[0])}
 
 
 def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:

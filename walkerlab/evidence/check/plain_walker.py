@@ -215,15 +215,16 @@ class PlainWalker:
         """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
-    def energy(self, state: Floats) -> float:
-        """Return kinetic plus potential energy (J).
 
-        Heights are measured from the point where an upright stance leg touches the slope.
-        """
-        angles, omega = self.bodies(STRAIGHT if len(state) == 4 else BENT, state)
-        places = self.levers * np.exp(1j * angles)
-        heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
-        return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
+def energy(walker: PlainWalker, state: Floats) -> float:
+    """Return kinetic plus potential energy (J).
+
+    Heights are measured from the point where an upright stance leg touches the slope.
+    """
+    angles, omega = walker.bodies(STRAIGHT if len(state) == 4 else BENT, state)
+    places = walker.levers * np.exp(1j * angles)
+    heights = (places.sum(axis=1) - walker.radius * state[STANCE]) * np.conj(walker.down)
+    return float(0.5 * omega @ walker.mass_matrix(places, walker.inertias) @ omega - walker.masses @ heights.real)
 
 
 def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:

@@ -128,11 +128,7 @@ class RuleFollower:
                 if self.turn is not None:
                     return False
             self._bends = bends
-        # whether a foot has crossed the ground or a pad's edge, or passed the other
-        (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
-        (left0, right0), (left1, right1) = self._edges
-        happened = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1)
-        happened = happened or not (left0 <= y0 < right0 and left1 <= y1 < right1)
+        happened = has_event(before, now, self._edges)
         if happened:
             self._apply_events(time_s, before, now, q, v)
         self._feet = now
@@ -226,6 +222,15 @@ class RuleFollower:
             self._end(Outcome.FELL)
         elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(Outcome.NO_HEEL_STRIKE)
+
+
+def has_event(before: Feet, now: Feet, edges: list[tuple[float, float]]) -> bool:
+    """Whether a foot has crossed the ground or an edge (m) of its pad or gap, or passed the other foot."""
+    (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
+    (left0, right0), (left1, right1) = edges
+    if (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1):
+        return True
+    return not (left0 <= y0 < right0 and left1 <= y1 < right1)
 
 
 def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float, q: Floats, v: Floats) -> bool:
