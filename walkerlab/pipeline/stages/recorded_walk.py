@@ -12,19 +12,17 @@ from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.config.recording import RecordedFile
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
+from walkerlab.exchange import leg_angles, rate_jumps
 from walkerlab.exchange.columns import LEG_QUANTITIES, WALKER_QUANTITIES, RecordedWalk, as_walk
-from walkerlab.exchange.leg_angles import mend_angles
-from walkerlab.exchange.rate_jumps import noise_of
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, find_tilt
 from walkerlab.outcome import Outcome
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import TIME_LABELS, leg_labels, step_columns, variables_over_time
-from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store import artifact, files
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
 NOISY_RATIO = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
@@ -33,7 +31,7 @@ NOISY_RATIO = 0.02  # ratio of noise to amplitude above which times of single st
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the recording's content, so that a changed file makes results outdated."""
     assert config.recording is not None, "the stage requires the block"
-    return {"recording.file": file_digest(Path(config.recording.file)) or NO_FILE}
+    return {"recording.file": files.file_digest(Path(config.recording.file)) or NO_FILE}
 
 
 def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -71,7 +69,7 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
     """Yield a sentence for each reason to doubt the steps: odd angles, noise, and unused columns or samples."""
     yield from walk.doubts
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
-    noise = noise_of(angles)
+    noise = rate_jumps.noise_of(angles)
     amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
     if noise > NOISY_RATIO * amplitude:
         yield (
@@ -92,7 +90,7 @@ def read_walk(block: RecordedFile, slope_rad: float) -> RecordedWalk:
     path = Path(block.file)
     key = "recording", "file"
     recording = read_file(path, read_artifact, key) if path.suffix.lower() == ".h5" else read_recording(path, key)
-    return mend_angles(as_walk(recording, block, slope_rad), block.file)
+    return leg_angles.mend_angles(as_walk(recording, block, slope_rad), block.file)
 
 
 def read_artifact(path: Path) -> Recording:
