@@ -1,7 +1,5 @@
 """Export a walker with the start of its gait to ADAMS and MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeVar, get_args
@@ -33,7 +31,7 @@ class ExportedFiles:
 
 
 def export_model(
-    config: Config,
+    config: "Config",
     start: exported.GaitStart,
     kind: Kind,
     law: Law = "contact",
@@ -97,7 +95,7 @@ def parse_slope(text: str) -> Slope:
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
-def add_stops(config: Config) -> Config:
+def add_stops(config: "Config") -> "Config":
     """Return a config in which a stop brings each knee to rest before it locks.
 
     When a joint is activated, ADAMS changes velocities by other rules than ours. If the knee is at rest, they have no
@@ -110,7 +108,7 @@ def add_stops(config: Config) -> Config:
     return config.model_copy(update={"walker": stopped})
 
 
-def parts_left_out(export: exported.Exported, config: Config, kind: Kind, law: Law, script: str) -> Iterator[str]:
+def parts_left_out(export: exported.Exported, config: "Config", kind: Kind, law: Law, script: str) -> Iterator[str]:
     """Describe the parts of the walk of a config that an exported model lacks or replaces."""
     by_functions = kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:

@@ -1,7 +1,5 @@
 """Walker to export, on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator
@@ -56,7 +54,7 @@ class GaitStart(NamedTuple):
 class Exported:
     """Walker on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
-    config: Config
+    config: "Config"
     scene: engine_scene.EngineScene  # walker and ground in the form that other programs need
     steps: int  # maximum number of steps of the walk
     walk: ContactWalkResult  # walk of the contact model from that start
@@ -186,7 +184,7 @@ def identifier(name: str) -> str:
     return plain if plain[:1].isalpha() else f"m_{plain}"
 
 
-def prepare_export(config: Config, start: GaitStart) -> Exported:
+def prepare_export(config: "Config", start: GaitStart) -> Exported:
     """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid start.
 
     Raises ConfigError for a walker or a ground that cannot be exported.
@@ -200,7 +198,7 @@ def prepare_export(config: Config, start: GaitStart) -> Exported:
     return Exported(config, scene, steps, walk, heights, contact_scene.pinned)
 
 
-def refuse(config: Config) -> None:
+def refuse(config: "Config") -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
     if config.contact is None:
         raise walkers.contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")

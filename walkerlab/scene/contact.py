@@ -1,7 +1,5 @@
 """Build the contact model of a config with only the parts that the config needs, and starts with scaled velocities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -162,7 +160,7 @@ def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_
     return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
 
 
-def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """Find the gait of the contact model on a plane without pads that lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":

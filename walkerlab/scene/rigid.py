@@ -1,7 +1,5 @@
 """Build the rigid model of a config, with only the parts that the config needs, and the heights of its footholds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -41,7 +39,7 @@ class RigidScene:
     walker: RigidModel
     names: tuple[str, ...]  # names of the state variables
     knees_m: tuple[Position, ...]  # position of each leg's knee in its thigh's frame; empty without knees
-    outputs: tuple[Output, ...]  # outputs to record over time
+    outputs: "tuple[Output, ...]"  # outputs to record over time
     ground: contact.Footholds
 
     def walk(
@@ -59,7 +57,7 @@ class RigidScene:
         return recorded_walk.take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 
-def rigid_scene(config: reads.RigidConfig, ground: contact.Footholds, outputs: tuple[Output, ...]) -> RigidScene:
+def rigid_scene(config: reads.RigidConfig, ground: contact.Footholds, outputs: "tuple[Output, ...]") -> RigidScene:
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
@@ -69,7 +67,7 @@ def rigid_scene(config: reads.RigidConfig, ground: contact.Footholds, outputs: t
     )
 
 
-def rigid_walker(config: reads.RigidConfig, equations: Equations | None = None) -> RigidModel:
+def rigid_walker(config: reads.RigidConfig, equations: "Equations | None" = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
     level = level_walker(config.walker, config.gravity_m_s2)
     driven = add_drives(change_slope(level, config.slope_rad), config)

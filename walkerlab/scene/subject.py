@@ -1,7 +1,5 @@
 """Models with their gaits, ready to be disturbed or differentiated, and step maps over a parameter for families."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -41,14 +39,14 @@ def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
     return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
 
 
-def scene_for(step_length_m: float) -> Callable[[ContactConfig], ContactScene]:
+def scene_for(step_length_m: float) -> "Callable[[ContactConfig], ContactScene]":
     """Return a function from configs to their contact scenes, with pads and terrain for steps of this length."""
     from walkerlab.scene.contact import contact_scene
 
     return lambda config: contact_scene(config, step_length_m, step_length_m)
 
 
-def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
+def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> "ContactMap":
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(step_length_m)

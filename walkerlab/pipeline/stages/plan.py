@@ -1,7 +1,5 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -75,7 +73,7 @@ def refuse(config: reads.PlanConfig) -> None:
         )  # fmt: skip
 
 
-def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
+def row_of(option: "WayToMeasure", units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
     errors = [
         {"key": key, "standard_error": error, "unit": units[key]}
         | ({"wanted": wanted[key], "steps_needed": option.steps_needed[key]} if key in wanted else {})
@@ -89,7 +87,7 @@ def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, 
     }
 
 
-def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
+def curves_of(options: "Sequence[WayToMeasure]", keys: Sequence[str]) -> Group:
     """Build the group of errors by number of steps, with missing values for undetermined parameters."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]

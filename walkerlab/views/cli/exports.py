@@ -1,7 +1,5 @@
 """Exports for use in other programs: figures, tables and trajectories as files, and walks as GIF or MP4."""
 
-from __future__ import annotations
-
 import io
 import re
 import shlex
@@ -187,7 +185,7 @@ def page_tables(folder: runs.RunFolder) -> dict[str, Table]:
     }
 
 
-def find_item(folder: runs.RunFolder, name: str) -> Illustration | Table:
+def find_item(folder: runs.RunFolder, name: str) -> "Illustration | Table":
     """Find a figure or table by name.
 
     Raises ConfigError for an unknown name. Its advice lists the items of the run.
@@ -224,7 +222,7 @@ def plan_run(folder: runs.RunFolder) -> Planner:
     return planner
 
 
-def figure(folder: runs.RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
+def figure(folder: runs.RunFolder, illustration: "Illustration", kind: str, target: Target, console: Console) -> bytes:
     """Draw a figure as on the page, but at the target's size, and return the file's bytes.
 
     Raises StaleError if its results are missing.
