@@ -31,8 +31,7 @@ from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between
 from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.laws import ground_law, hinge_law_of
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters, ground_law, hinge_law_of
 from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:

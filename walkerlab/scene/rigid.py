@@ -21,7 +21,6 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pa
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene import parts
-from walkerlab.scene.laws import hinge_law_of
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
     Raises ConfigError if the parts are not a valid walker.
     """
-    law = hinge_law_of(walker)
+    law = parts.hinge_law_of(walker)
     assembly = parts.assembly_of(walker, rigid=True)
     try:
         return rigid_on_level_ground(assembly, gravity, parts.knee_locked_at_strike(walker), law)
