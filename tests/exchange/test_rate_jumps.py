@@ -1,4 +1,4 @@
-"""Find heel strikes by jumps of the rates in recordings with an unknown slope or offset."""
+"""Tests of heel strikes found by jumps of the rates, in recordings with an unknown slope or offset."""
 
 import math
 from pathlib import Path
@@ -10,8 +10,8 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.config.recording import Recorded
 from walkerlab.exchange.columns import as_walk
-from walkerlab.exchange.rate_jumps import MOST_FOUND, squares_around, sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording
+from walkerlab.exchange.touches import MOST_FOUND, squares_around, sums_at_jumps
 from walkerlab.exchange.walk_in_steps import divide_into_steps
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.pipeline.plan.graph import PIPELINE
@@ -28,7 +28,7 @@ def found_gait(config):
 
 
 def recorded(name, strides=4):
-    """Return the config's walker, and times and noisy angles (samples, 2) of its gait."""
+    """Return the walker of a config, with times and noisy angles (samples, 2) of its gait."""
     config = load(Path(name), (f"strides={strides}",)).config
     trajectory = simulate.run(restrict(config, PIPELINE["simulate"].takes), found_gait(config), Silent()).groups[
         "trajectory"

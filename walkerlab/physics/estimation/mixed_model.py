@@ -20,29 +20,32 @@ from walkerlab.physics.solvers.system import Floats
 
 NOISE_FACTORS: Final = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
-"""Starts of the search: measurement noises as multiples of the current one, and disturbances as fractions. Roughness is
-a fraction of the leg length, and kicks are fractions of the rates."""
-# bounds on roughness and kicks, as these fractions
+"""Starts of the search: measurement noises as multiples of the current one, roughness as fractions of the leg length,
+and kicks as fractions of the rates.
+"""
+# bounds on roughness and kicks, as the same fractions
 DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)
-# as such a fraction; a smaller disturbance cannot be distinguished from none
+# fraction below which a disturbance cannot be distinguished from none
 NEGLIGIBLE_DISTURBANCE: Final = 1e-5
 NOISE_RATIO: Final = 1.0
-"""Prior standard deviation of the logarithm of the quantities' relative noises.
+"""Prior standard deviation of the logarithms of the relative noises of the quantities.
 
 Without this prior, the floor could explain one quantity of a short walk exactly, with a noise of zero. A single
-quantity has no ratio: there, the prior density of its noise is proportional to the noise, which keeps the estimate
-about one standard error away from zero where noise and floor cannot be separated.
+quantity has no ratio. The prior density of its noise is then proportional to the noise, which keeps the estimate about
+one standard error away from zero if noise and floor cannot be separated.
 
 Source: Chung et al., A nondegenerate penalized likelihood estimator for variance parameters in multilevel models,
 Psychometrika 78 (2013).
 """
 NOISE_SEARCH: Final = {"ftol": 1e-7, "gtol": 1e-2}
 """The search ends when the likelihood changes by less than `ftol` (relative), or when its slope is below `gtol`."""
-# number of entries in the matrices of all noise levels that are evaluated together, a limit on the memory
+# maximum number of entries in the matrices of the noise levels that are evaluated together, which limits the memory
 MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
 MIN_GAINS: Final = (1e-6, 0.5)
-"""A disturbance by heights, or one that includes kicks, must raise the log-likelihood by more than this to be kept."""
+"""A disturbance by heights, or one that includes kicks, is kept only if it raises the log-likelihood by more
+than this.
+"""
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
@@ -74,7 +77,7 @@ class Linearised:
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
-    # (values,) parts of the measured values that a robust loss leaves out of the residuals
+    # (values,) parts of the measured values that a robust loss has cut off from the residuals
     trimmed: Floats | float = 0.0
     kicks: int = 0  # number of kicks
 
@@ -84,7 +87,9 @@ class Linearised:
 
 
 class Evaluation(NamedTuple):
-    """Likelihoods and the most likely unknowns. Several sets of standard deviations add leading axes."""
+    """Likelihoods and the most likely unknowns. For several sets of standard deviations, all arrays have
+    leading axes.
+    """
 
     restricted: Any  # log-likelihood of the standard deviations with their prior, from the data alone
     likelihood: Any  # log-likelihood of the data
@@ -167,7 +172,7 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     # A reduced row stands for several values, each of which contributes the logarithm of its noise.
     log_determinant = 2.0 * (np.log(deviations) @ rows.counts + np.log(diagonal).sum(axis=-1))
     by_data = white @ white.swapaxes(-1, -2)
-    # Without priors: a prior that contradicts the data says nothing about the noise.
+    # Leave out the priors, because a prior that contradicts the data says nothing about the noise.
     _, _, squares, log_information = most_likely(by_data)
     restricted = prior_of_noise(rows, deviations)[0] - 0.5 * (log_determinant + squares + log_information)
     whole = by_data + rows.prior
@@ -220,7 +225,8 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
     scale = 1.0 / np.asarray(noise.measurement)[..., rows.quantity]
     disturbed = np.einsum("...s,sij->...ij", noise.process**2, rows.covariance)
     covariance = disturbed * scale[..., None, :] * scale[..., :, None]
-    # Add rounding errors to the noise, because large disturbances would hide it in them and make the matrix singular.
+    # Add rounding errors to the noise. Otherwise large disturbances would hide the noise, and the matrix would be
+    # singular.
     rounding = ROUNDING * np.trace(covariance, axis1=-2, axis2=-1)[..., None]
     np.einsum("...ii->...i", covariance)[...] += 1.0 + rounding
     return np.asarray(covariance)
@@ -279,7 +285,7 @@ def estimate_noise(
 def noise_by_disturbances(
     rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise]
 ) -> Iterator[tuple[Noise, float]]:
-    """Yield the likeliest noise, and its likelihood, without disturbances, with each kind of them and with both kinds.
+    """Yield the likeliest noise and its likelihood without disturbances, with each kind of disturbance, and with both.
 
     Each search starts from the likeliest of several noises.
     """
@@ -342,8 +348,8 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
     """Return a function that whitens values (values,) of a walk with this noise, or columns (values, n) of values.
 
-    Values with the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, become independent and
-    of unit variance.
+    If values have the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, whitening makes them
+    independent with unit variance.
     """
     scale = 1.0 / noise.measurement[data.quantity]
     U, s, _ = np.linalg.svd(data.G * data.spread(noise) * scale[:, None], full_matrices=False)

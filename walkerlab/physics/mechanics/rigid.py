@@ -57,7 +57,7 @@ def rigid_on_level_ground(
 def build_first_leg_model(
     assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper]
 ) -> RigidModel:
-    """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
+    """Build the model for steps in which the first leg swings. The arguments are those of `rigid_on_level_ground`."""
     hip = find_hip(assembly)
     groups = group_bodies(assembly)
     swing_foot, foot = assembly.feet
