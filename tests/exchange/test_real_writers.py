@@ -45,7 +45,7 @@ def write_with_ezc3d(path, markers, units=("mm",), residuals=None):
 
 
 @pytest.mark.parametrize("units", [("mm",), ()])
-def test_blank_and_repeated_c3d_labels_do_not_matter(units, tmp_path):
+def test_blank_and_repeated_c3d_labels_are_harmless(units, tmp_path):
     path = tmp_path / "walk.c3d"
     spare = [("", 0.0 * HIP), ("*1", HIP), ("", HIP)]
     write_with_ezc3d(path, [*spare, *MARKERS.items(), ("*1", 2.0 * HIP)], units)

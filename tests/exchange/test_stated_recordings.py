@@ -370,7 +370,7 @@ def test_sports2d_levels_the_floor_and_says_so(walks, sign, tmp_path):
 
 
 @pytest.mark.parametrize("apart_m", [0.0, 0.05])
-def test_legs_that_do_not_meet_at_one_hip_are_doubted(apart_m, tmp_path):
+def test_legs_that_do_not_meet_at_one_hip_raise_a_doubt(apart_m, tmp_path):
     time, angle = sampled()
     hip, *feet = places_of(angle)[:, :, :2].swapaxes(0, 1)
     other = np.c_[apart_m * np.sin(2.0 * np.pi * time), 0.0 * time]
