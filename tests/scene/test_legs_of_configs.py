@@ -172,6 +172,29 @@ def test_damped_knee_takes_the_same_work_from_both_models():
     assert walk.driven.hip == 0.0
 
 
+def test_spring_at_the_hip_and_dampers_at_the_knees_do_separate_work():
+    spring = 0.2
+    sets = ("walker.knee.damping_N_m_s_per_rad=0.01", f"walker.hip.spring_N_m_per_rad={spring}")
+    config = config_of("kneed", *sets, "contact.terrain=plane")
+    state = gait_of(config).state
+    scene = scene_on_pads(config, 0.4, state)
+    # Both feet stand on the slope, but closer together than they land, so the spring takes up energy.
+    half = len(state) // 2
+    middle = 0.5 * (state[SWING] + state[STANCE])
+    closer = (middle + 0.9 * (angle - middle) for angle in state[:half])
+    start = start_state(scene, (*closer, *state[half:]))
+    walks = [scene.walk(start, 1, tolerances_of(config, 1))]
+    walks.append(scene.walk(start, 1, tolerances_of(config, 1), walks[0].touch_time_s))
+    walk = walks[1]
+    assert walk.steps == 1
+    touched = walk.samples.states[-1]
+    taken_up = 0.5 * spring * ((touched[2] - touched[3]) ** 2 - (start[2] - start[3]) ** 2)
+    assert taken_up > 1e-4
+    assert walk.driven.hip == pytest.approx(-taken_up, rel=1e-6)
+    assert walk.driven.knees == pytest.approx(walk.samples.driven_J[-1, 1], rel=1e-6)
+    assert walk.driven.knees < 0.0
+
+
 LEVEL = ("slope_deg=0", "walker.hip={spring_N_m_per_rad: 10}")
 
 

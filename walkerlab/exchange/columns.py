@@ -27,8 +27,7 @@ from walkerlab.exchange.marker_lines import (
     spell_rows,
     swap_lines_back,
 )
-from walkerlab.exchange.recording import SEGMENTS, TIME, UNIT_IN_NAME, Array, Recording
-from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
+from walkerlab.exchange.recording import SEGMENTS, SI, TIME, UNIT_IN_NAME, UNIT_VALUES, Array, Recording, value_in_si
 
 LEG_QUANTITIES: Final = {
     "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
@@ -641,7 +640,7 @@ def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units
     """Return the positions (samples, axes) of both ends of a line in m, or as recorded if their unit is unknown."""
     scale = scale_of_line(recording, pairs, units) or {}
     top, bottom = (
-        np.stack([recording.columns[column] * scale.get(column, 1.0) for column in end], axis=1)
+        np.stack([recording.columns[column] * scale.get(column, 1.0) for column in end]).T
         for end in zip(*pairs, strict=True)
     )
     return top, bottom

@@ -61,7 +61,7 @@ def papers_left_out(content):
 
 
 def names(folder):
-    return sorted(path.name for path in (folder / "figures").iterdir())
+    return sorted(path.name for path in folder.glob("figures/*"))
 
 
 def test_every_figure_is_an_svg_and_a_png(whole):

@@ -45,8 +45,8 @@ NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 # a round ends when the cost or the unknowns change by less than this (relative)
-FIT_TOLERANCE: Final = 1e-6
-SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
+FIT_TOLERANCE: Final = 1e-4
+SAME_DERIVATIVES: Final = 0.1  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # standard deviation of a weak prior on each scaled unknown, which keeps undetermined combinations near the start
 WEAK_PRIOR: Final = 1.0
@@ -112,6 +112,7 @@ class Fitted:
     u: Floats  # (unknowns,) scaled unknowns
     disturbances: Floats  # (heights + kicks,) most probable floor heights (m) and kicks
     noise: Noise
+    noises: tuple[Noise, ...]  # likeliest noise for each set of disturbances, see `Reduced.disturbance_sets`
     evaluation: Evaluation
     data: Linearised
     predicted: Prediction  # walk over even ground, from the most probable start
@@ -165,6 +166,7 @@ def fit(
     if data is None:
         return None
     robust = None
+    noises: tuple[Noise, ...] = ()
     for done in range(rounds):
         on_round()
         before = u
@@ -179,7 +181,7 @@ def fit(
             return None
         rows = reduce(data)
         earlier = noise
-        noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
+        noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, noise, noises)
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
             noise = average_noise(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation = evaluate(rows, noise)
@@ -191,7 +193,9 @@ def fit(
         if end is FitEnd.WALK_FAILS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
-        moved = float(np.max(np.abs(u - before) / errors))
+        # The next round would start with this move. It may stop at a bound.
+        ahead = np.clip(u + evaluation.move, *problem.limits()) - u
+        moved = min(float(np.max(np.abs(each) / errors)) for each in (u - before, ahead))
         if moved < MOVE_TOLERANCE and noise_has_converged(rows, earlier, noise, problem.leg_length_m):
             end = FitEnd.CONVERGED
             break
@@ -203,7 +207,7 @@ def fit(
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return None
-    return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, end)
+    return Fitted(problem, u, disturbances, noise, noises, evaluate(reduce(data), noise), data, predicted, end)
 
 
 def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
@@ -230,12 +234,10 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     if data is None or predicted is None:
         return None
     rows = reduce(data)
-    noise = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise)
+    noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise, like.noises)
     evaluation = evaluate(rows, noise)
     disturbances = most_probable_disturbances(rows, noise, evaluation.move)
-    return replace(
-        like, u=u, disturbances=disturbances, noise=noise, evaluation=evaluation, data=data, predicted=predicted
-    )
+    return Fitted(problem, u, disturbances, noise, noises, evaluation, data, predicted, like.end)
 
 
 def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:

@@ -16,7 +16,6 @@ from walkerlab.physics.estimation.mixed_model import (
     Noise,
     evaluate,
     noise_at,
-    noise_by_disturbances,
     whitening,
 )
 from walkerlab.physics.estimation.result import Information, Unidentifiable
@@ -154,11 +153,7 @@ def average_over_plausible_noise(fitted: Fitted, basis: Floats) -> Floats:
 
 def likely_noises(fitted: Fitted) -> Noise:
     """Return the likeliest noise for each set of disturbances (none, one kind, both kinds), stacked in one `Noise`."""
-    problem = fitted.problem
-    noises, _ = zip(
-        *noise_by_disturbances(fitted.rows, problem.floors, problem.leg_length_m, fitted.noise), strict=True
-    )
-    return Noise(*map(np.array, zip(*noises, strict=True)))
+    return Noise(*map(np.array, zip(*fitted.noises, strict=True)))
 
 
 def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:

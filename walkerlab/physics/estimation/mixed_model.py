@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -174,10 +175,11 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     # Leave out the priors, because a prior that contradicts the data says nothing about the noise.
     _, _, squares, log_information = most_likely(by_data)
     restricted = prior_of_noise(rows, deviations)[0] - 0.5 * (log_determinant + squares + log_information)
-    information, move, squares, _ = most_likely(by_data + rows.prior)
+    whole = by_data + rows.prior
+    _, move, squares, _ = most_likely(whole)
     values = int(rows.counts.sum()) + rows.priors
     likelihood = -0.5 * (log_determinant + squares + values * math.log(2.0 * math.pi))
-    return Evaluation(restricted, likelihood, information, move, squares)
+    return Evaluation(restricted, likelihood, whole[..., 1:, 1:], move, squares)
 
 
 def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
@@ -205,9 +207,9 @@ def restricted_likelihood_and_slope(rows: Reduced, noise: Noise) -> tuple[float,
     fixed = rows.fixed * scale[:, None]
     inverse = np.linalg.inv(V)
     solved = inverse @ fixed
-    information, move, squares, log_information = most_likely(fixed.T @ solved)
+    covariance, move, squares, log_information = most_likely(fixed.T @ solved)
     left = solved @ np.append(1.0, -move)
-    P = inverse - solved[:, 1:] @ np.linalg.pinv(information, LOST_INFORMATION, hermitian=True) @ solved[:, 1:].T
+    P = inverse - solved[:, 1:] @ covariance @ solved[:, 1:].T
     unexplained = P - np.outer(left, left)
     density, slope = prior_of_noise(rows, noise.measurement)
     log_determinant = 2.0 * np.log(noise.measurement) @ rows.counts + np.linalg.slogdet(V)[1]
@@ -231,22 +233,24 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return the information, the step to the most likely unknowns, the sum of squares there, and a log-determinant.
+    """Return the unknowns' covariance and step to their most likely values, the sum of squares there, and a
+    log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
     The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
     errors.
     """
-    information = reduced[..., 1:, 1:]
     score = reduced[..., 1:, 0]
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = np.linalg.eigh(reduced[..., 1:, 1:])
     kept = values > LOST_INFORMATION * values.max(axis=-1, initial=0.0)[..., None]
     sizes = np.where(kept, values, 1.0)
+    # The products are taken in this order, because the covariance itself may be large and known to few digits only.
     parts = np.einsum("...ij,...i->...j", vectors, score) * kept / sizes
     move = np.einsum("...ij,...j->...i", vectors, parts)
+    covariance = (vectors * (kept / sizes)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     squares = reduced[..., 0, 0] - np.einsum("...i,...i->...", score, move)
-    return information, move, squares, np.log(sizes).sum(axis=-1)
+    return covariance, move, squares, np.log(sizes).sum(axis=-1)
 
 
 def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Floats:
@@ -257,22 +261,29 @@ def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Flo
     return np.asarray(spread**2 * (rows.G.T @ (scale * np.linalg.solve(covariance_in_noise(rows, noise), left))))
 
 
-def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
+def estimate_noise(
+    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise] = ()
+) -> tuple[Noise, tuple[Noise, ...]]:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
+    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are the simpler
+    explanation, so more of them must raise the likelihood.
+
+    earlier  likeliest noises of nearly the same rows, from which the searches start if they are likelier than others
     """
     best = start
     best_likelihood = -math.inf
-    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start):
+    noises = []
+    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start, earlier):
+        noises.append(noise)
         if likelihood > best_likelihood + MIN_GAINS[bool(noise.kick)]:
             best = noise
             best_likelihood = likelihood
-    return best
+    return best, tuple(noises)
 
 
 def noise_by_disturbances(
-    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise
+    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise]
 ) -> Iterator[tuple[Noise, float]]:
     """Yield the likeliest noise and its likelihood without disturbances, with each kind of disturbance, and with both.
 
@@ -284,15 +295,16 @@ def noise_by_disturbances(
     measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
     levels = np.log(DISTURBANCES)
     logs: dict[tuple[int, ...], Floats] = {}
-    for sources in rows.disturbance_sets():
+    for sources, known in zip_longest(rows.disturbance_sets(), earlier):
         starts = [np.append(row, level) for row in measured for level in levels] if sources else [np.log(middle)]
         if len(sources) == 2:
             # Start where one disturbance alone explains the walk best, and add the other one.
             starts = [np.insert(logs[(0,)], middle.size + 1, level) for level in levels]
             starts += [np.insert(logs[(1,)], middle.size, level) for level in levels]
-        before = (start.process / units)[list(sources)]
-        if sources and before.min() > NEGLIGIBLE_DISTURBANCE:
-            starts.append(np.log(np.append(middle, before)))
+        for before in filter(None, (start, known)):
+            shares = (before.process / units)[list(sources)]
+            if sources and shares.min() > NEGLIGIBLE_DISTURBANCE:
+                starts.append(np.log(np.append(np.clip(before.measurement, floors, widest), shares)))
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
         bounds = np.log([np.append(noise, [bound] * len(sources)) for noise, bound in ends]).T
         logs[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
