@@ -128,7 +128,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
         # The configs differ only if `add_stops` has replaced an ideal lock.
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
-        when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
+        when = "act at the touch times of walkerlab's walk, because ADAMS functions have no memory"
         if any(export.impulses_N_s):
             yield f"the trigger of push-offs; open-loop pulses {when}"
         if export.hip.torque_N_m:

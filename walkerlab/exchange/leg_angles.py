@@ -196,7 +196,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     begin = [0, *turns][longest]
     end = [*turns, walk.time_s.size - 1][longest]
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
-    kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
+    kept = f"the longest stretch in one direction, from {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
     return select_rows(
         add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
@@ -250,7 +250,7 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
     if noise > NOISY_RATIO * amplitude:
         yield (
             f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
-            "heel strikes, and so periods and lengths of single steps, are uncertain."
+            "heel strikes are uncertain, and with them periods and lengths of single steps."
         )
     for name, reason in walk.left_out.items():
         yield f"Not used: {name}: {reason.removesuffix('.')}."

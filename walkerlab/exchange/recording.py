@@ -195,7 +195,7 @@ def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, .
         mode = path.stat().st_mode
         # A folder is not refused here, because the attempt to read it raises an OSError with the right reason.
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            advice = "Save what it delivers as a file first."
+            advice = "Save its output as a file first."
             raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
         return reader(path)
     except OSError as error:
@@ -337,7 +337,7 @@ def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
     if not rows:
         raise ConfigError(f"{path} is empty.", "Export it again.")
     if len(rows) == 1 and any(character.isalpha() for character in rows[0]):
-        raise ConfigError(f"{path} has a header and no rows of numbers.", "Export it again, with its samples.")
+        raise ConfigError(f"{path} has a header but no rows of numbers.", "Export it again, with its samples.")
     for separator, name in (("|", "vertical bars"), (":", "colons"), (None, "blanks")):
         cells = [[cell.strip() for cell in row.split(separator)] for row in rows[-2:]]
         if all(sum(map(is_number, row)) > 1 for row in cells):
@@ -528,7 +528,7 @@ def parse_step(path: Path, number: int, step: ElementTree.Element, count: int) -
         ) from None
     if len(values) != count:
         raise ConfigError(
-            f"{path}: step {number} holds {len(values)} numbers for {count} components.", "Export the results again."
+            f"{path}: step {number} has {len(values)} numbers for {count} components.", "Export the results again."
         )
     return values
 
@@ -641,7 +641,7 @@ def read_c3d(path: Path) -> Recording:
     labels = [str(label).strip() for label in arrays["labels"]]
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
     if not any(labels) or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(labels):
-        raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")
+        raise ConfigError(f"{path} has no markers or no frame rate.", "Export it again.")
     # ezc3d adds a fourth coordinate to each point.
     values = places[:3, : len(labels)].transpose(1, 0, 2).reshape(-1, places.shape[2])
     unit = str(arrays["units"][0]).strip() if arrays["units"].size else ""

@@ -233,13 +233,11 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return the unknowns' covariance and step to their most likely values, the sum of squares there, and a
-    log-determinant.
+    """Return covariance and most likely change of the unknowns, the sum of squares after it, and a log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
-    The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
-    errors.
+    The last value is the logarithm of the determinant of the information, from eigenvalues that exceed rounding errors.
     """
     score = reduced[..., 1:, 0]
     values, vectors = np.linalg.eigh(reduced[..., 1:, 1:])
@@ -266,10 +264,10 @@ def estimate_noise(
 ) -> tuple[Noise, tuple[Noise, ...]]:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are the simpler
-    explanation, so more of them must raise the likelihood.
+    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are a simpler
+    explanation, so more of them count only if they raise the likelihood.
 
-    earlier  likeliest noises of nearly the same rows, from which the searches start if they are likelier than others
+    earlier  likeliest noises for nearly the same rows; searches start from them if they are likelier than other starts
     """
     best = start
     best_likelihood = -math.inf

@@ -26,7 +26,7 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     GAIN: (1.0, 0.1),
     DELAY: (0.0, 0.05),
 }
-"""Properties of clock and sensors that can be estimated, each with the value if it is not, and a typical change."""
+"""Properties of clock and sensors that can be estimated: the value if a property is not, and a typical change."""
 # Directions of the start are dropped if changes along them have a smaller relative effect on the next step than this.
 MIN_EFFECT: Final = 1e-3
 LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as later than the last heel strike.
