@@ -89,7 +89,9 @@ class RecordedWalk:
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then shifted."""
+    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then `constant` is
+    added.
+    """
 
     column: str
     sign: float = 1.0
@@ -209,7 +211,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
 def remove_unlikely_positions(
     recording: Recording, lines: Sequence[str], least: float | None
 ) -> tuple[Recording, list[str]]:
-    """Turn positions of the markers of `lines` with a likelihood below `least` into gaps. Also return notes.
+    """Mark positions of the markers of `lines` as gaps if their likelihood is below `least`. Also return notes.
 
     Raises ConfigError if the file has no likelihoods although the user gives a limit.
     """
@@ -241,7 +243,7 @@ def remove_unlikely_positions(
 
 
 def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Turn angles that stand still for some samples and then leap into gaps.
+    """Mark angles as gaps where they stand still for some samples and then leap.
 
     Software that fills gaps produces such angles.
     """

@@ -91,12 +91,12 @@ def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Ch
 
 
 def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names, as `choose` does."""
+    """Return the ADAMS contact law that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, CONTACT_LAWS, "--law", "contact law")
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way of expressing a slope that `text` names, as `choose` does."""
+    """Return the way to express a slope that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 

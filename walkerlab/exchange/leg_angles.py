@@ -39,7 +39,8 @@ MIN_VARIANCE: Final = 1e-30  # rad^2; added to variances, because they may be ze
 HIGHEST_DEGREE: Final = 7
 SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
 FAR_PERCENT: Final = 80  # legs are far apart if the angle between them is above this percentile
-SEARCH_RANGE: Final = 0.3  # strikes are searched for this long before and after a first guess, as a fraction of a step
+# time before and after a first guess in which a strike is searched for, as a fraction of a step
+SEARCH_RANGE: Final = 0.3
 MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions

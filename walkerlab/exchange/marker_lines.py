@@ -25,7 +25,7 @@ MIN_RELATIVE_JUMP: Final = 0.01  # the same as a fraction of the length
 NEIGHBOURS: Final = 5  # number of neighbouring changes with whose median a change is compared
 MAX_VALUE: Final = 1e50  # values above this count as gaps, because their squares overflow
 MIN_FROZEN: Final = 3  # minimum number of missing samples for which a marker counts as frozen
-# maximum number of samples that a leap makes up for, as a multiple of the frozen samples before it
+# maximum number of samples of normal motion that a leap covers, as a multiple of the frozen samples before it
 MAX_LEAP: Final = 1.5
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 MAX_SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
@@ -208,7 +208,7 @@ def stated_direction(walks: str, up: Array) -> Array:
 def replace_unseen(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Turn the coordinates of markers that were not seen into gaps. Also return the reasons, by column.
+    """Mark the coordinates of markers that were not seen as gaps. Also return the reasons, by column.
 
     Programs write zeros, or some other value, for all coordinates of a marker that they did not see. A foot may also
     stand at the origin, so equal coordinates are a gap only if they give the line an unusual length.

@@ -153,7 +153,7 @@ class Recording:
     """Time series of a recording as stored in the file, before any unit conversion. Missing values are nan."""
 
     path: Path
-    columns: dict[str, Array]  # (samples,) arrays by name
+    columns: dict[str, Array]  # values (samples,) by name of the column
     units: dict[str, str] = field(default_factory=dict)  # unit by column as written in the file, if it states one
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
@@ -305,7 +305,8 @@ def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[Row]:
 
 
 def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[str], int]:
-    """Find the header: the first row of names above a row of as many values, perhaps with a row of units between them.
+    """Find the header, which is the first row of names above a row of as many values. A row of units may be between
+    them.
 
     Returns the delimiter, the names, the units ('' without a row of units), and the line number of the first values.
     Tables with several columns are preferred to tables with one, and names that are words to names that are numbers.

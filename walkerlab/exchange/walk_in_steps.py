@@ -59,7 +59,7 @@ MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
 SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
-"""Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
+"""Largest relative difference between the distance over a belt and that from the leg angles that raises no doubt."""
 # ratio of clock rates above which a clock that contradicts the swing of the legs raises a doubt
 MAX_CLOCK_RATIO: Final = 1.15
 NOISE_IN_CLOCK: Final = 7.0  # multiple of the relative scatter of the angles by which that limit grows
@@ -76,7 +76,9 @@ STRIKE_MARGIN: Final = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 is the leg that swings first."""
+    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 belongs to the leg that swings
+    first.
+    """
 
     time_s: Array  # (samples,) s, from the first heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
@@ -132,7 +134,8 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
 
 
 def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
-    """Return the vectors (samples,) in m from the hip over the foot centre of leg 0 to that of leg 1, normal + i along.
+    """Return the vectors (samples,) between two positions of the hip (m): above leg 0 and above leg 1, if the foot
+    centres of both legs were at one point. The real part is normal to the slope, and the imaginary part along it.
 
     angles  (samples, 2) of straight legs, from the vertical
     """
@@ -298,7 +301,7 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Disagreement between the two signs of a heel strike: jumps of the leg rates, and level feet."""
+    """Disagreement between the two signs of a heel strike, which are jumps of the leg rates and level feet."""
 
     shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
     sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
@@ -327,7 +330,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 
 def alternates(first: Array, second: Array) -> bool:
-    """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
+    """Whether the means of two samples differ clearly, like those of odd and even steps in a limp."""
     if min(first.size, second.size) < MIN_ALTERNATING_STRIKES:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
