@@ -263,7 +263,7 @@ def test_adams_result_names_match_recording_columns():
     assert found["torso_velocity"] == "walker.torso_velocity"
 
 
-def test_commands_run_a_pinned_first_step_and_release_it():
+def test_commands_simulate_a_pinned_first_step_and_then_release_the_foot():
     exported = files_of("adm", "functions", "paper", "contact.stance=pinned")
     dataset, commands = (text.splitlines() for text in exported.files.values())
     first = export_of("paper", "contact.stance=pinned").touches_s[0]

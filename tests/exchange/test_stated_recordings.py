@@ -122,7 +122,7 @@ def test_level_camera_has_no_estimated_tilt(tmp_path):
     assert abs(tilt) < 0.05
 
 
-def test_free_tilt_and_a_free_offset_are_one_unknown():
+def test_free_tilt_excludes_a_free_offset():
     with pytest.raises(ConfigError, match="camera_tilt_deg: free estimates already"):
         load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[angle_offset_rad]"))
     block = load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[clock_rate]")).config.identify

@@ -204,7 +204,7 @@ def test_tangents_of_a_limping_walk_equal_difference_quotients(name, first_leg):
 
 
 @pytest.mark.parametrize(("model", "accuracy"), [("rigid", 1e-9), ("contact", 1e-5)])
-def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later(model, accuracy):
+def test_walk_that_begins_with_leg_2_is_the_same_gait_half_a_stride_later(model, accuracy):
     subject, family = limping("prosthesis", model)
     walks = [step_map_of(subject, family, leg) for leg in (1, 2)]
     first, second = (

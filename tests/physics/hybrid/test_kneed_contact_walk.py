@@ -190,7 +190,7 @@ def test_scaled_copy_of_a_kneed_walker_takes_the_same_steps():
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
 
 
-def test_one_compiled_walk_serves_straight_legs_knees_and_a_pinned_step():
+def test_straight_legs_knees_and_a_pinned_step_share_one_compiled_walk():
     contact_walks.walked(steps=1)
     compiled = set(walk_in_form.signatures)
     contact_walks.walked("contact.stance=pinned", steps=1)
