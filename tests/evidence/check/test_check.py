@@ -334,7 +334,7 @@ def test_answer_says_which_values_a_cause_explains_and_how_far_off_others_are():
     assert "After one exact step it has changed by 0.0045 (angles in rad, rates times sqrt(L/g)), 45 units" in words
 
 
-def test_state_is_typed_on_the_command_line():
+def test_state_can_be_given_on_the_command_line():
     done = run("-c", "paper", "--state", "[-0.2042, 0.1694; -0.6058 -0.8610]")
     assert done.exit_code == 0
     assert "Right: 4 printed values reproduced to the last digit." in done.output
