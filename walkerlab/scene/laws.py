@@ -1,4 +1,4 @@
-"""Laws that a config names: those of the ground and of the hinges, built-in ones and those of extensions."""
+"""Find the laws of ground and hinges that a config names, whether built in or added by extensions."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ def law_class(kind: LawKind, word: str) -> Any:
     """
     try:
         law = kind.laws.get(word) or load(code_by_word(kind.key)[word])
-    # The code is another package's, which may raise anything.
+    # The code may be that of another package, and raise any error.
     except Exception as error:
         raise ConfigError(
             f"{kind.key}: the code of '{word}' cannot be imported: {type(error).__name__}: {error}.",
@@ -34,7 +34,7 @@ def law_class(kind: LawKind, word: str) -> Any:
 
 
 def ground_law(kind: LawKind, contact: Contact) -> Any:
-    """Create the law that a contact block in SI names. Raises ConfigError as `law_class` does."""
+    """Create the law of a contact block in SI. Raises ConfigError as `law_class` does."""
     law = law_class(kind, getattr(contact, kind.key))
     try:
         return law.from_contact(contact)
@@ -47,7 +47,7 @@ def where_to_look(kind: LawKind) -> str:
 
 
 def missing_members(law: type, kind: LawKind) -> list[str]:
-    """List what the class of a law lacks: members of the protocol, and registered cases of functions."""
+    """List what the class of a law lacks: members of the protocol, and cases registered for it in functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
     if kind.derived and not issubclass(law, kind.protocol):

@@ -1,4 +1,4 @@
-"""Walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
+"""Simulate a walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -79,8 +79,8 @@ def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: 
 
 
 def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
-    """Return the asymmetry of the last stride, including that of stance times, touch to lift (leg 2 minus leg 1)."""
-    # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
+    """Return the asymmetry of the last stride (leg 2 minus leg 1), including that of the times from touch to lift."""
+    # Leg 2 is the stance leg in the first step of a stride. The last stance foot may not have lifted yet.
     count = walk.steps - walk.steps % STRIDE
     if not count or walk.stance_s.size < count:
         return {}
@@ -104,7 +104,8 @@ def summary(config: ContactSimConfig, scene: contact.ContactScene, walk: Contact
         "rolling_m": walk.rolling_m.tolist(),
         "energy_balance_residual_J": walk.energy_balance_residual_J,
         "dissipated_J": losses_by_channel(scene.walker, walk.dissipated_J),
-        # This old key of the knee strike times is kept until version 0.3. It has -1 where a knee did not lock.
+        # Until version 0.3, the knee strike times are also stored under their old key, with -1 for a knee that did not
+        # lock.
         **(
             {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
         ),

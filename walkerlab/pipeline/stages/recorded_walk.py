@@ -27,7 +27,7 @@ from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
-NOISY_RATIO = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
+NOISY_RATIO = 0.02  # above this ratio of noise to amplitude, times of single steps are wrong by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -60,7 +60,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Return the walk without the camera's tilt, which is found from the jumps of the leg rates at heel strikes."""
+    """Find the camera's tilt from the jumps of the leg rates at heel strikes, and return the walk without it."""
     tilt = find_tilt(walk, model)
     upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
     doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
@@ -68,7 +68,8 @@ def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
 
 
 def doubts_about(walk: RecordedWalk) -> Iterator[str]:
-    """Yield a sentence for each reason to doubt the steps: odd angles, noise, and unused columns or samples."""
+    """Yield a sentence for each reason to doubt the steps: odd angles, noise, and columns or samples that were not
+    used."""
     yield from walk.doubts
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
     noise = noise_of(angles)
@@ -123,8 +124,8 @@ def read_artifact(path: Path) -> Recording:
 def content_of(
     block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps, doubts: Sequence[str]
 ) -> Content:
-    """Build the content, with the same names as for computed walks. Energies and forces are included only if
-    they were recorded.
+    """Build the content to store, with the names of computed walks. It has energies and forces only if they were
+    recorded.
     """
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)

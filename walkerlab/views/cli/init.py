@@ -35,7 +35,8 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
-    """Write a walker's commented config and the schema. With `checks`, the config is short and has a printed gait to
+    """Write a walker's commented config and the schema. If `checks` is true, the config is short and has a printed gait
+    to
     fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
@@ -69,7 +70,7 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
 def template(walker: str) -> str:
     types: dict[str, str] = {}
     for name in (DEFAULT, *builtin_names()):
-        # Several built-in configs have walkers of one type. The first is its template.
+        # Several built-in configs have walkers of the same type. The first of them is the template of the type.
         types.setdefault(load(Path(name)).config.walker.type, name)
     choices = types | {name: name for name in builtin_names()}
     if walker not in choices:

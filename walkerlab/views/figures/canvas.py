@@ -28,13 +28,13 @@ MAX_FILL = 0.95
 LEGEND_ROWS = 3
 """Number of legend rows that fit in a figure's nominal height. Longer legends make the figure taller."""
 HEIGHT_EXPONENT = 0.7
-"""A figure's height is proportional to its width raised to this power. It is below 1, because text hardly shrinks."""
+"""Power of a figure's width to which its height is proportional. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_PLAIN_NUMBER: Final = 1e4
-"""Largest number written without an exponent."""
+"""Largest number that labels show without an exponent."""
 
 
 @contextlib.contextmanager
@@ -50,7 +50,7 @@ def is_narrow() -> bool:
 
 
 class ShownFigure(Figure):
-    """Figure that notebooks show as a picture, even if they have not set up matplotlib."""
+    """Figure that a notebook shows as a picture, even if it has not set up matplotlib."""
 
     def _repr_png_(self) -> bytes:
         file = io.BytesIO()
@@ -59,10 +59,11 @@ class ShownFigure(Figure):
 
 
 def blank(height: float) -> Figure:
-    """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
+    """Create a figure of the style's width. `height` (in) applies to the default width. It shrinks less than the width
+    does."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** HEIGHT_EXPONENT), layout="constrained")
-    # The canvas measures texts, on which the layout depends.
+    # The layout depends on the sizes of texts, which the canvas measures.
     FigureCanvasAgg(figure)
     return figure
 
