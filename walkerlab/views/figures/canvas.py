@@ -123,12 +123,12 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
 
 
 def settle(figure: Figure) -> None:
-    """Lay the figure out once, so that all its files look the same."""
+    """Lay the figure out, once for all of its files, so that they look the same."""
     engine = figure.get_layout_engine()
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
     break_lines(figure)
-    # Wrapped labels and axes of equal scale change the layout, so it is computed again.
+    # The layout is computed again, because wrapped labels and axes of equal scale have changed it.
     engine.execute(figure)
     figure.set_layout_engine(None)
 
@@ -150,7 +150,7 @@ RASTER_KINDS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
-    """Return the figure as a file of one kind. `name` makes the ids in an SVG unique among figures."""
+    """Return the figure as a file of one kind. `name` keeps the ids in an SVG different from those of other figures."""
     # Files of equal figures are equal to the byte, so they must not contain a date or a version.
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
@@ -160,7 +160,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
         "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
     }
     file = io.BytesIO()
-    # By default, matplotlib makes ids from random numbers.
+    # Without a salt, matplotlib would make ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(file, format=kind, dpi=dpi if kind in RASTER_KINDS else PNG_DPI, **undated[kind])
     return file.getvalue()
@@ -168,7 +168,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure's files as bytes, with its caption."""
+    """Files of a figure as bytes, and its caption."""
 
     svg: bytes
     png: bytes
@@ -178,6 +178,6 @@ class Drawing:
 def files_of(
     figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
 ) -> list[bytes]:
-    """Lay out a figure and return a file of each kind. `name` makes SVG ids unique among figures."""
+    """Lay out a figure and return a file of each kind. `name` is as in `as_file`."""
     settle(figure)
     return [as_file(figure, kind, name, title, dpi) for kind in kinds]
