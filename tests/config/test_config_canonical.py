@@ -103,7 +103,7 @@ def test_slice_does_not_depend_on_the_order_of_keys() -> None:
     assert canonical_json(one) == canonical_json(other)
 
 
-def test_slice_without_a_type_is_the_whole_config() -> None:
+def test_stage_without_a_config_type_gets_the_whole_config() -> None:
     assert slice_of(CONFIG, None) == CONFIG.model_dump(mode="json")
     assert restrict(CONFIG, None) is CONFIG
 

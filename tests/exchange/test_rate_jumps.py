@@ -10,8 +10,8 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.config.recording import Recorded
 from walkerlab.exchange.columns import as_walk
-from walkerlab.exchange.rate_jumps import MOST_FOUND, squares_around, sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording
+from walkerlab.exchange.touches import MOST_FOUND, squares_around, sums_at_jumps
 from walkerlab.exchange.walk_in_steps import divide_into_steps
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.pipeline.plan.graph import PIPELINE

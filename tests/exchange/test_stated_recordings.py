@@ -183,13 +183,13 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
     assert summary["doubts"] == ["The file's times, 30 frames/s, are replaced by 240 frames/s."]
 
 
-def test_frame_rate_of_a_table_with_one_row_is_refused_in_words(tmp_path):
+def test_frame_rate_of_a_table_with_one_row_is_refused_with_a_message(tmp_path):
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.0, 0.1, -0.1)])
     with pytest.raises(ConfigError):
         steps_of(path, fps=100.0)
 
 
-def test_angles_that_would_overflow_are_refused_in_words(tmp_path):
+def test_angles_that_would_overflow_are_refused_with_a_message(tmp_path):
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.01 * n, 1e300 * n, 0.1) for n in range(200)])
     with pytest.raises(ConfigError):
         steps_of(path)

@@ -5,24 +5,60 @@ They unwrap full turns, exchange swapped legs, drop outliers, correct signs, and
 Each repair is listed in the doubts of the walk, with samples and times.
 """
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, select_rows
-from walkerlab.exchange.marker_lines import MAX_NAMED, spell_samples, swap_doubt, swapped_rows
-from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
-from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
-from walkerlab.exchange.touches import SIGNIFICANT_ERRORS
+from walkerlab.exchange.marker_lines import MAD_TO_DEVIATION, MAX_NAMED, spell_samples, swap_doubt, swapped_rows
+from walkerlab.exchange.touches import (
+    SIGNIFICANT_ERRORS,
+    WINDOW_AHEAD,
+    Array,
+    apart_runs,
+    noise_of,
+    squares_around,
+    typical_interval,
+)
 
 UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg's angle from the vertical
 MIN_PASSING_SAMPLES: Final = 3  # a passing of the legs takes at least this many sample intervals
+NOISY_RATIO: Final = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 MIN_VARIANCE: Final = 1e-30  # rad^2, added to a variance that may be zero
+HIGHEST_DEGREE: Final = 7  # of the polynomial through a step, whose error is then 0.1 mrad for straight legs
+SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
+FAR_PERCENT: Final = 80  # legs count as far apart above this percentile of the angle between them
+SEARCH_RANGE: Final = 0.3  # strikes are searched for this long before and after a first guess, as a fraction of a step
+MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
+MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
+MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
+MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
+MAX_STRETCH: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
+BORDER: Final = 0.1  # fraction of a step at the far end of a fit that is left to other fits
+LASTING_BORDER: Final = 0.15  # as `BORDER`, for lasting jumps
+LENGTH_TRIALS: Final = 16  # number of lengths of a stretch that are tried first
+FIRST_TRIALS: Final = 25  # number of instants tried for a strike
+NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
+STANDARD_ERRORS: Final = 7.0
+MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
+TYPICAL_PERCENT: Final = 30
+MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
+MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
+MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
+JOINT_SEARCH_FRACTION: Final = 0.5  # above this fraction of the limit, stretch and strike are searched for together
+MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
+MAX_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
+MIN_NORM: Final = 0.12  # smallest squared part of a stretch, in samples, that polynomials must not follow
 
 
 @dataclass(frozen=True)
@@ -197,3 +233,332 @@ def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
     if hip is None:
         return (begin + end) // 2
     return begin + int(np.argmax(hip[begin : end + 1] * (1.0 if before.forwards else -1.0)))
+
+
+def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
+    """Yield a sentence for each reason to doubt the steps: odd angles, noise, and unused columns or samples."""
+    yield from walk.doubts
+    angles = read_leg_angles(walk)
+    noise = noise_of(angles)
+    amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
+    if noise > NOISY_RATIO * amplitude:
+        yield (
+            f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
+            "heel strikes, and so periods and lengths of single steps, are uncertain."
+        )
+    for name, reason in walk.left_out.items():
+        yield f"Not used: {name}: {reason.removesuffix('.')}."
+
+
+# Smooth course of the angles ------------------------------------------------------------------------------------------
+
+# Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before
+# and the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off that
+# course if a constant added to it explains much more of the residuals than scatter does, and more than in typical
+# steps. The strike is located again for every stretch, because a wrong sample near a strike moves it.
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples of a leg that return to a smooth course if a constant is subtracted."""
+
+    leg: int
+    first: int
+    end: int  # first sample after the stretch
+    offset_rad: float
+    explained: float  # rad^2, squared residuals that the offset explains
+    lasts: bool  # whether the angle never returns to its course
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """Samples of the steps before and after a heel strike, and the span of time in which it may be."""
+
+    time: Array
+    angle: Array
+    rows: NDArray[np.int64]  # indices of the samples in the recording
+    span_s: tuple[float, float]
+    smooth_instant: float  # s, the instant of the strike in a smooth course
+    step_s: float
+    at_ends: tuple[bool, bool]  # whether the recording begins and ends with these samples
+
+    def fit(self, at: float) -> tuple[Array, Array]:
+        """Return the orthonormal basis (samples, columns) of polynomials that meet at an instant, and the residuals."""
+        t = self.time - at
+        columns = [np.ones((t.size, 1))]
+        for side in (t < 0.0, t >= 0.0):
+            degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
+            t_side = np.where(side, t / self.step_s, 0.0)
+            # Repeated products take a tenth of the time that powers take.
+            columns.append(np.multiply.accumulate(np.broadcast_to(t_side[:, None], (t_side.size, degree)), axis=1))
+        basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
+        return basis, self.angle - basis @ (basis.T @ self.angle)
+
+    @cached_property
+    def smooth_fit(self) -> tuple[Array, Array]:
+        """Basis and residuals of a smooth course."""
+        return self.fit(self.smooth_instant)
+
+    def scatter(self) -> Array:
+        """Return the residuals of the smooth course, scaled up because the fit follows part of the scatter."""
+        basis, residuals = self.smooth_fit
+        free = 1.0 - np.sum(basis**2, axis=1)
+        clear = free > MIN_NORM
+        return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
+
+    def best_with_strike(self) -> tuple[Stretch, float]:
+        """Return the stretch with the smallest sum of squared residuals over all strike times, and that sum (rad^2)."""
+
+        def left(at: float) -> float:
+            parts = self.fit(at)
+            return float(np.sum(parts[1] ** 2)) - self.best_stretch(parts).explained
+
+        spans = np.array([self.span_s])
+        at = float(find_instants(spans, np.vectorize(left, [float]), 2 * FIRST_TRIALS, *NEXT_TRIALS)[0])
+        return self.best_stretch(self.fit(at)), left(at)
+
+    def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
+        """Return the stretch that explains most of the residuals of a fit (basis and residuals)."""
+        sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
+        longest = max(1, int(np.searchsorted(self.time, self.time[0] + MAX_STRETCH * self.step_s)))
+        lengths = np.unique(np.geomspace(1, longest, LENGTH_TRIALS).astype(int))
+        low, high = self.inner_samples(BORDER)
+        # To save time, long stretches are tried at widely spaced positions. The best one is refined below.
+        short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
+        inner = np.arange(*self.inner_samples(LASTING_BORDER, whole=False))
+        count = self.time.size
+        lasting = first_and_end(inner, count - inner)
+        spans = np.concatenate((short[short[:, 1] <= high], lasting))
+        first, end, leg = best_span(sums, spans)
+        lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
+        if not lasts:
+            # Refine: try all spans whose ends are near those of this one.
+            near = np.arange(-1 - (end - first) // 4, 2 + (end - first) // 4)
+            around = np.stack(np.meshgrid(first + near, end + near), axis=2).reshape(-1, 2)
+            fits = (around[:, 0] >= low) & (around[:, 1] <= high) & (around[:, 1] > around[:, 0])
+            first, end, leg = best_span(sums, around[fits])
+        norm, share = parts_of(sums, np.array([(first, end)]))
+        offset = float(share[0, leg] / norm[0])
+        return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
+
+    def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
+        """Return the samples (first, end) farther from the ends than `part` of a step. Other fits cover the rest.
+
+        whole  whether to go up to an end of the recording
+        """
+        away_s = part * self.step_s
+        first, end = np.searchsorted(self.time, (self.time[0] + away_s, self.time[-1] - away_s))
+        return 0 if whole and self.at_ends[0] else int(first), self.time.size if whole and self.at_ends[1] else int(end)
+
+
+def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int) -> Array:
+    """Return the instants (spans,) of the smallest costs, in s.
+
+    spans     (spans, 2) s, where to search
+    costs_at  function from instants (spans, trials) to their costs
+    counts    numbers of trials, in ever smaller intervals
+    """
+    begin, end = spans.T
+    each = np.arange(len(spans))
+    for count in counts:
+        trials = np.linspace(begin, end, count, axis=1)
+        costs = costs_at(trials)
+        # The next interval, and the parabola at the end, need a trial on each side of the best.
+        best = np.clip(np.argmin(costs, axis=1), 1, count - 2)
+        begin, middle, end = (trials[each, best + k] for k in (-1, 0, 1))
+    # Take the vertex of the parabola through the best trials.
+    left, least, right = (costs[each, best + k] for k in (-1, 0, 1))
+    bend = left - 2.0 * least + right
+    move = 0.5 * (left - right) / np.where(bend > 0.0, bend, np.inf)
+    return np.asarray(middle + np.clip(move, -1.0, 1.0) * (end - middle))
+
+
+def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the spans (spans, 2) that begin at the samples `first` and have the given length."""
+    return np.stack((first, first + length), axis=1)
+
+
+def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return for spans (first, end) the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
+
+    sums  cumulative sums of the fit's orthonormal basis and of its residuals
+    """
+    first, end = spans.T
+    inside, share = (part.take(end, axis=0) - part.take(first, axis=0) for part in sums)
+    return end - first - np.vecdot(inside, inside), share
+
+
+def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Return first sample, end and leg of the span that explains most of the residuals."""
+    norm, share = parts_of(sums, spans)
+    # Over some spans polynomials follow a constant almost entirely. Dividing by the rest would magnify rounding.
+    explained = np.where(norm > MIN_NORM, 1.0 / np.maximum(norm, MIN_NORM), 0.0)[:, None] * share**2
+    best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
+    return int(spans[best, 0]), int(spans[best, 1]), int(leg)
+
+
+def find_stretches(time: Array, angle: Array) -> list[Stretch]:
+    """Find the stretches of samples (of the recording) at which a leg is off its smooth course.
+
+    time   (samples,) s, rising
+    angle  (samples, 2) rad, from the vertical
+    """
+    far = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
+    if noise_of(angle) > MAX_SCATTER * far:
+        return []
+    found = find_leaps(time, angle, MAX_STRETCH * course_of(time, angle).step_s)
+    course = course_of(time, angle, found)
+    strikes = course.strikes(range(len(course.spans)))
+    sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
+    # Polynomials through sparse samples would follow errors, too.
+    if not sampled or np.max(np.diff(time)) > MAX_GAP * course.step_s:
+        return found
+    scatter = MAD_TO_DEVIATION * float(
+        np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes])))
+    )
+    worst = [strike.best_stretch(strike.smooth_fit).explained for strike in strikes]
+    limit = max((STANDARD_ERRORS * scatter) ** 2, MIN_EXPLAINED_RATIO * float(np.percentile(worst, TYPICAL_PERCENT)))
+    # A false strike in one step makes the neighbouring steps look wrong as well.
+    for index in np.argsort(worst)[::-1].tolist():
+        if worst[index] > JOINT_SEARCH_FRACTION * limit:
+            new = stretches_near(course, index, limit, MIN_OFFSET * far)
+            found = found + new
+            course = course.remove_stretches(new)
+    return found
+
+
+def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
+    """Find the stretches that begin and end with a jump faster than a leg can move."""
+    moved = np.diff(angle, axis=0)
+    fastest = MAX_MOTION * float(np.percentile(np.abs(moved), FAR_PERCENT))
+    found = []
+    for leg in (0, 1):
+        jumps = np.flatnonzero(np.abs(moved[:, leg]) > fastest).tolist()
+        while len(jumps) > 1:
+            first, back = jumps[:2]
+            returns = moved[first, leg] * moved[back, leg] < 0.0 and time[back] - time[first] < longest_s
+            if returns:
+                found.append(Stretch(leg, first + 1, back + 1, float(moved[first, leg]), 0.0, lasts=False))
+            # If the second jump does not undo the first, only the first is dropped: the second may begin a stretch.
+            jumps = jumps[2 if returns else 1 :]
+    return found
+
+
+def stretches_near(course: Course, index: int, limit: float, smallest: float) -> list[Stretch]:
+    """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
+
+    def worst(others: Sequence[Stretch]) -> Stretch | None:
+        """Return the worst stretch in addition to others, or None if it is within the limit."""
+        strike = course.remove_stretches(others).strikes([index])[0]
+        if strike.best_stretch(strike.smooth_fit).explained <= JOINT_SEARCH_FRACTION * limit:
+            return None
+        stretch, left = strike.best_with_strike()
+        explains = float(np.sum(strike.smooth_fit[1] ** 2)) - left > limit
+        if not explains or abs(stretch.offset_rad) < smallest:
+            return None
+        rows = strike.rows
+        return replace(stretch, first=int(rows[stretch.first]), end=int(rows[stretch.end - 1]) + 1)
+
+    found: list[Stretch] = []
+    while len(found) < MAX_STRETCHES and (stretch := worst(found)):
+        found.append(stretch)
+    # Each stretch was found without the later ones. With them, it may no longer be needed.
+    for stretch in found[:-1]:
+        others = [other for other in found if other is not stretch]
+        found = found if worst(others) else others
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Samples of a recording, and the time span (s) of each stretch in which one leg is far ahead of the other."""
+
+    time: Array
+    angle: Array
+    rows: NDArray[np.int64]  # indices of the samples in the recording
+    spans: list[tuple[float, float]]
+    step_s: float
+    # Not in `__init__`, so that `replace` drops them: guesses made with wrong samples are wrong once these are removed.
+    guesses: dict[int, float] = field(default_factory=dict, init=False)
+
+    def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
+        """Drop the samples of stretches that end. For those that last, subtract the offset from all later samples."""
+        angle = self.angle.copy()
+        kept = np.ones(self.rows.size, bool)
+        for stretch in stretches:
+            if stretch.lasts:
+                angle[self.rows >= stretch.first, stretch.leg] -= stretch.offset_rad
+            else:
+                kept &= (self.rows < stretch.first) | (self.rows >= stretch.end)
+        return replace(self, time=self.time[kept], angle=angle[kept], rows=self.rows[kept])
+
+    def strikes(self, indices: Sequence[int]) -> list[Strike]:
+        """Return the samples around the heel strikes in the spans with these indices."""
+        self.guess(indices)
+        ends = [self.ends_around(index) for index in indices]
+        slices = [self.slice_of(first, last) for first, last, _ in ends]
+        spans = [span for *_, span in ends]
+        instants = self.smooth_instants(slices, spans, FIRST_TRIALS, *NEXT_TRIALS)
+        return [
+            Strike(
+                self.time[near], self.angle[near], self.rows[near], span, at, self.step_s,
+                (near.start == 0, near.stop == self.time.size),
+            )
+            for near, span, at in zip(slices, spans, instants, strict=True)
+        ]  # fmt: skip
+
+    def ends_around(self, index: int) -> tuple[float, float, tuple[float, float]]:
+        """Return the beginning and end (s) of the steps around a strike, and the span of time in which to search it."""
+        begin, end = self.spans[index]
+        at = self.guesses[index]
+        farthest = MAX_FIT_TIME * self.step_s
+        first = max(self.guesses[index - 1] + MARGIN * self.step_s, at - farthest) if index else float(self.time[0])
+        following = index + 1 < len(self.spans)
+        last = min(self.guesses[index + 1] - MARGIN * self.step_s, at + farthest) if following else float(self.time[-1])
+        return first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
+
+    def guess(self, indices: Iterable[int]) -> None:
+        """Add first guesses of the times at which rates jump, for some spans and their neighbours."""
+        nearby = {near for index in indices for near in (index - 1, index, index + 1)}
+        new = sorted(nearby.intersection(range(len(self.spans))) - self.guesses.keys())
+        spans = [self.spans[index] for index in new]
+        half = 0.5 * self.step_s
+        slices = [self.slice_of(begin - half, end + half) for begin, end in spans]
+        self.guesses.update(zip(new, self.smooth_instants(slices, spans, FIRST_TRIALS), strict=True))
+
+    def smooth_instants(
+        self, slices: Sequence[slice], spans: Sequence[tuple[float, float]], *counts: int
+    ) -> list[float]:
+        """Return the instants (s) of strikes in a smooth course through some samples."""
+        parts = [(self.time[near], self.angle[near]) for near in slices]
+
+        def costs_at(instants: Array) -> Array:
+            return squares_around(parts, instants, HIGHEST_DEGREE, SAMPLES_PER_DEGREE)
+
+        return find_instants(np.array(spans), costs_at, *counts).tolist() if parts else []
+
+    def slice_of(self, first_s: float, last_s: float) -> slice:
+        return slice(int(np.searchsorted(self.time, first_s)), int(np.searchsorted(self.time, last_s, "right")))
+
+
+def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
+    """Return the course of a recording without some stretches: rates jump while one leg is far ahead of the other."""
+    course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
+    time = course.time
+    angle = course.angle
+    spread = angle[:, 0] - angle[:, 1]
+    far = WINDOW_AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
+    apart = apart_runs(np.abs(spread) > far, spread > 0.0)
+    shortest = MIN_TIME_AHEAD * float(
+        np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT)
+    )
+    runs: list[tuple[int, int]] = []
+    for first, last in apart:
+        # Outliers make brief runs, and divide a run into two.
+        whole = time[last] - time[first] >= shortest or first == 0 or last == time.size - 1
+        goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
+        if whole:
+            runs[len(runs) - goes_on :] = [(runs[-1][0] if goes_on else first, last)]
+    spans = [(float(time[first]), float(time[last])) for first, last in runs]
+    step_s = typical_interval([0.5 * (begin + end) for begin, end in spans], time)
+    return replace(course, spans=spans, step_s=step_s)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.rate_jumps import Array, apart_runs
+from walkerlab.exchange.touches import Array, apart_runs
 
 Line = tuple[Array, Array]
 """Positions (samples, axes) of the upper and the lower marker (m)."""

@@ -15,11 +15,19 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
-from walkerlab.exchange.leg_angles import read_leg_angles
+from walkerlab.exchange.leg_angles import FAR_PERCENT, HIGHEST_DEGREE, SAMPLES_PER_DEGREE, read_leg_angles
 from walkerlab.exchange.marker_lines import MAX_NAMED
-from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
-from walkerlab.exchange.smooth_course import FAR_PERCENT, HIGHEST_DEGREE, SAMPLES_PER_DEGREE
-from walkerlab.exchange.touches import SIGNIFICANT_ERRORS, Height, Touch, angles_at_jumps, find_touches
+from walkerlab.exchange.touches import (
+    SIGNIFICANT_ERRORS,
+    Array,
+    Height,
+    Touch,
+    angles_at_jumps,
+    find_touches,
+    noise_of,
+    sums_at_jumps,
+    typical_interval,
+)
 from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -148,8 +156,8 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
     return np.asarray(2.0 * (direction - np.sign(direction) * level))
 
 
-def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
-    """Return the forward lean (rad) from the vertical of the direction from which angles are measured.
+def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
+    """Return the walk without the forward lean of the direction from which angles are measured, the camera's tilt.
 
     It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
@@ -165,7 +173,10 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     touches = find_touches(walk.time_s, angle, height)
     period = typical_interval([touch.time_s for touch in touches], walk.time_s)
     jumps = angles_at_jumps(walk.time_s, angle, touches, period)
-    return 0.5 * (float(np.mean(total(jumps[1]))) if jumps else sum_rad)
+    tilt = 0.5 * (float(np.mean(total(jumps[1]))) if jumps else sum_rad)
+    upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
+    doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
+    return replace(walk, quantities={**walk.quantities, **upright}, doubts=(*walk.doubts, doubt))
 
 
 def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:

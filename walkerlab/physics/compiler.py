@@ -31,9 +31,9 @@ CHECKSUM_BYTES = 32  # length of the SHA-256 digest that precedes a kernel's sto
 # index of the signature in the stored tuple
 SIGNATURE = 3
 # The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit;
-# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, so that no division
-# must be tested. References are not counted (_nrt), because kernels allocate nothing and borrow arrays from their
-# caller, and counting would take as long as the arithmetic.
+# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, so that divisions
+# need no test. References are not counted (_nrt), because kernels allocate nothing and borrow arrays from their caller,
+# and counting would take as long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 bodies: dict[type, list[Callable[..., Any]]] = {}
 """Functions that compiled code calls for a class, by class (see `kernels.ByType`)."""
@@ -108,7 +108,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             files_in_use.add(name)
 
     def file_name(self, signature: Any) -> str:
-        """Return the cached file's name for these argument types. It contains a hash of the user's code, if any."""
+        """Return the cached file's name for these argument types, with a hash of what the folder's name leaves out."""
         function = self.py_func
         location = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""

@@ -140,7 +140,7 @@ def test_converged_and_changing_periods_are_distinguished():
     assert "still changes these periods: drake lagged by 4.3 ms." in text
 
 
-def test_error_ratio_of_the_last_halving_is_reported():
+def test_ratio_of_errors_over_the_last_halving_of_the_step_is_reported():
     found = content().summary["convergence"]["compass"]["same-law"]
     assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
     assert "divides the error by mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]

@@ -66,7 +66,7 @@ def test_printed_number_has_a_value_and_a_last_digit(text, value, last_digit):
     assert printed(text).digits.unit == pytest.approx(last_digit)
 
 
-def test_verbal_comparisons_are_read_as_numbers():
+def test_comparisons_in_words_are_read_as_numbers():
     assert printed("less than 1%").value == printed("less than one").value == 1
 
 
@@ -260,7 +260,7 @@ def test_matlab_energy_is_explained_and_adams_energy_is_not_reproduced(rows):
     assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
-def test_fall_is_not_explained_by_a_start_that_walks(rows):
+def test_start_that_walks_does_not_explain_a_fall(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.values["contact"]) == (Verdict.NOT_REPRODUCED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence

@@ -142,7 +142,7 @@ def test_page_says_that_no_start_leads_to_walking():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_laid_for_a_missing_gait_give_no_answer():
+def test_pads_at_the_step_length_of_a_missing_gait_give_no_answer():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 

@@ -8,7 +8,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
-from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scaled, scene_cases, to_twin
+from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scale_config, scene_cases, to_twin
 from walkerlab.evidence.verification.judge import CaseCell
 from walkerlab.evidence.verification.stability import resolve_scene
 from walkerlab.evidence.verification.starts import RigidMasses, energy_gain, feet_off_the_slope
@@ -129,9 +129,9 @@ def test_summed_kinetic_energy_equals_that_of_the_equations(name):
 def test_scaling_a_walker_up_and_down_again_restores_it(name, sets):
     config = config_of(name, *sets)
     by = to_twin(config)
-    twin = scaled(config, by)
+    twin = scale_config(config, by)
     assert twin.walker.total_mass_kg == pytest.approx(by.mass * config.walker.total_mass_kg)
-    again = scaled(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
+    again = scale_config(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
     assert numbers_of(again.walker.model_dump()) == pytest.approx(numbers_of(config.walker.model_dump()))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
-from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_omissions, plain_power
 from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
 from walkerlab.evidence.benchmarks.trials import (
     USER_SCRIPT,
@@ -192,7 +192,7 @@ START_RATE_FACTOR = 0.98  # factor applied to the gait's velocities, because on 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Measure every method on every scene. Run times are compared, so no two runs take place at once."""
-    left_out: list[dict[str, Any]] = pinning_left_out(config, "methods")
+    left_out: list[dict[str, Any]] = pinning_omissions(config, "methods")
     if config.contact is not None and not is_passive_compass(config):
         left_out.append(dict(OMISSION_OFF_COMPASS))
     references: dict[str, Reference] = {}
@@ -279,7 +279,7 @@ def summarise(
     }
 
 
-def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
+def fastest_runs(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
     """Return the fastest run of each method on a scene with an error of at most `level`, the fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
@@ -290,7 +290,7 @@ def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[Met
 
 def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
     """Return the fastest method for each error level that some method reaches."""
-    fastest = {plain_power(level): good_enough(rows, scene, level) for level in ERROR_LEVELS}
+    fastest = {plain_power(level): fastest_runs(rows, scene, level) for level in ERROR_LEVELS}
     return {level: runs[0].method for level, runs in fastest.items() if runs}
 
 
@@ -298,7 +298,7 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
     """Return a sentence on which method is fastest at each error level, and by how much it beats the best library."""
     levels = []
     for level in ERROR_LEVELS:
-        runs = good_enough(rows, scene, level)
+        runs = fastest_runs(rows, scene, level)
         family = runs[0].method.split("-")[0] if runs else ""
         libraries = (
             run

@@ -7,7 +7,7 @@ from typing import Any
 from walkerlab.config.reads import ContactConfig
 
 
-def pinning_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
+def pinning_omissions(config: ContactConfig, measured: str) -> list[dict[str, str]]:
     """Return an omission if the config pins the first stance foot, because measured walks start with both feet free.
 
     measured  plural noun for what is measured, such as "engines"

@@ -318,7 +318,7 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> Ch
                 return best
             slow = size > SLOW_RATIO * last
             last = size
-        # A search this close to its goal has succeeded. Only rounding ends its progress.
+        # A search this close to its goal has succeeded: only rounding keeps it from coming closer.
         elif best is None or last < MAX_RESIDUAL:
             return best
         elif is_own:

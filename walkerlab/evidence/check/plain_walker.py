@@ -84,7 +84,7 @@ class PlainWalker:
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
     knee_damping: float = 0.0  # N m s/rad, while the knee is free
     # mistakes
-    signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors of velocity terms, by phase
+    signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors for velocity terms, by phase
     keeps_trailing_rate: bool = False
     # weights of the trailing and the leading leg's rates in the extra term I * rate of the balance at a strike
     extra_inertia: tuple[float, float] = (0.0, 0.0)
@@ -163,7 +163,7 @@ class PlainWalker:
 
     @cached_property
     def factors(self) -> dict[str, Floats]:
-        """Factors (bodies, bodies) of the velocity terms, by phase: 1, or -1 for a mistake in a sign.
+        """Factors (bodies, bodies) for the velocity terms, by phase: 1, or -1 for a mistake in a sign.
 
         The factor for rolling is 0, because the lever of a rolling foot does not turn.
         """
@@ -215,19 +215,20 @@ class PlainWalker:
         """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
-    def energy(self, state: Floats) -> float:
-        """Return kinetic plus potential energy (J).
 
-        Heights are measured from the point where an upright stance leg touches the slope.
-        """
-        angles, omega = self.bodies(STRAIGHT if len(state) == 4 else BENT, state)
-        places = self.levers * np.exp(1j * angles)
-        heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
-        return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
+def energy(walker: PlainWalker, state: Floats) -> float:
+    """Return kinetic plus potential energy (J).
+
+    Heights are measured from the point where an upright stance leg touches the slope.
+    """
+    angles, omega = walker.bodies(STRAIGHT if len(state) == 4 else BENT, state)
+    places = walker.levers * np.exp(1j * angles)
+    heights = (places.sum(axis=1) - walker.radius * state[STANCE]) * np.conj(walker.down)
+    return float(0.5 * omega @ walker.mass_matrix(places, walker.inertias) @ omega - walker.masses @ heights.real)
 
 
 def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
-    """Return the angles and then the rates of all bodies, from coordinates at which the swing leg is straight."""
+    """Convert coordinates with a straight swing leg to the angles and then the rates of all bodies."""
     if not walker.kneed:
         return coordinates[:4]
     shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
@@ -235,7 +236,7 @@ def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
 
 
 def coordinates(walker: PlainWalker, state: Floats) -> Floats:
-    """Return the coordinates just after a heel strike from the state of all bodies."""
+    """Convert the state of all bodies just after a heel strike to coordinates."""
     n = len(state) // 2
     return np.concatenate((state[:2], state[n : n + 2 + int(walker.kneed and walker.free_at_strike)]))
 
@@ -502,7 +503,8 @@ class Mistake(NamedTuple):
     what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
     of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
     first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # smallest size that is larger than errors of a program, and largest size
+    # smallest size (a smaller mistake hides in the errors of a program) and largest size
+    limits: tuple[float, float] = (0.0, 0.0)
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
@@ -550,7 +552,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield the velocity terms in the equations of motion whose signs may be wrong together, with a description."""
+    """Yield groups of velocity terms in the equations of motion that may share a wrong sign, and describe them."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}

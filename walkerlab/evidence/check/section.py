@@ -122,7 +122,7 @@ def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
 
 
 def remarks(summary: Row) -> Iterator[str]:
-    """Yield sentences about explanations, periodicity, momenta, the nearest gait and the two routes."""
+    """Yield sentences about explanations, periodicity, momenta, the nearest gait and the agreement of both models."""
     rows = summary["values"]
     explanations = summary["explanations"]
     if len(explanations) > 1:

@@ -317,7 +317,7 @@ def impulse(times: Floats, rate: Floats) -> Floats:
 
 
 def integration_errors(times: Floats, rate: Floats) -> Floats:
-    """Estimate the error of each interval by Simpson's rule minus the midpoint rule, in the worst component."""
+    """Estimate the error of each interval, in the worst component, as Simpson's rule minus the midpoint rule."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))

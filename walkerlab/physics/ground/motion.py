@@ -50,8 +50,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
     Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
     """
-    # Until it is solved for, r is the sum of the torques of feet, hinges, stops, centrifugal forces and, in a pinned
-    # form, gravity.
+    # First, r collects the torques of feet, hinges, stops, centrifugal forces and, in a pinned form, gravity.
     form = system.form
     forms.sines_cosines(form, y, s, c)
     n = form.bodies

@@ -171,6 +171,7 @@ class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one o
     start_energy: float  # J, initial energy, with potential energy measured from a fixed origin
     energy_below: float  # J, initial energy, with potential energy measured from the slope below the walker
     start_spring: float  # J, initial elastic energy of the springs at the hinges
+    spring_work: float  # J, work of these springs up to the last touch that ended a step
 
 
 CONTACT_TALLY = record_type(ContactTally, {})
@@ -250,10 +251,10 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Copy the account at a step's end, for the work in completed steps. The copied hip work includes the springs."""
+    """Record account and work of the springs at a step's end, for the work in completed steps."""
     for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[channels.HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
+    observer.tally.spring_work = observer.tally.start_spring - hinge_energies(system, y)[0]
 
 
 @kernel_part

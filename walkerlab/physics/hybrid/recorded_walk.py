@@ -122,7 +122,7 @@ def take_walk(
         recorder.nearest = rigid_walk.SHORTEST_LANDING * judged_by
     height = rigid.swing_foot(walker, start)[0]
     # The walk starts in mid-step, so the swing foot leaves no foothold, and its own height takes the place of one.
-    # Otherwise its event function, the height above that foothold, would be taken for zero at the start.
+    # Otherwise its event function would be taken for zero at the start.
     if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)

@@ -136,7 +136,7 @@ def lock(
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
         project(tree, constraints, rates, along=0.0, upward=0.0, twist=0.0, turned=turned, p=changes)
-    # Because p is a projection in the metric M, p^T M (omega - p) = 0. The kinetic energy lost is therefore this.
+    # Because p is a projection in the metric M, p^T M (omega - p) = 0, which simplifies the loss to this form.
     return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 

@@ -183,7 +183,7 @@ def have_equal_legs(assembly: parts.Assembly) -> bool:
 
 
 def are_equal(one: Floats, other: Floats) -> bool:
-    return bool(np.allclose(one, other, rtol=SYMMETRY_TOLERANCE, atol=SYMMETRY_TOLERANCE * np.abs(one).max()))
+    return bool(np.all(np.abs(one - other) <= SYMMETRY_TOLERANCE * (np.abs(one).max() + np.abs(other))))
 
 
 def leg_measures(assembly: parts.Assembly, k: int) -> tuple[Floats, ...]:

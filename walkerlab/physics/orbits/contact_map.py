@@ -67,7 +67,7 @@ def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Return the bodies that turn independently, the swing leg's first. The locked stance shank is none of them."""
+    """Return the bodies that turn independently, the swing leg's first. The locked stance shank is not among them."""
     # If only one leg has a knee, there is one body fewer while that leg stands.
     locked = locked_shank(walker, stance)
     # `legs` repeats the last body of a leg without a knee, and `dict.fromkeys` drops the repetition.

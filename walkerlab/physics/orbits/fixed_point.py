@@ -94,7 +94,7 @@ class RigidGait:
 
     @property
     def asymmetry(self) -> dict[str, float]:
-        """Second step minus first step, in length and in period, divided by the mean of both."""
+        """Differences in length and in period between the second and the first step, relative to the mean of both."""
         (first_period, first_length), (second_period, second_length) = self.steps
         return {
             "step_length": (second_length - first_length) / self.step_length,

@@ -32,7 +32,7 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # number of quantities at the beginning that follow from a single stride
+STEP_QUANTITY_COUNT = 3  # number of quantities, listed first, that follow from a single stride
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
@@ -208,7 +208,10 @@ def make_gradient(value: float, error: float) -> Gradient:
 
 
 def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) -> Gradient:
-    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps."""
+    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps.
+
+    change, error  (d, d) derivative of A with respect to the parameter, and its error
+    """
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))

@@ -67,7 +67,7 @@ SERIES_SETTINGS = {
 
 
 def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
-    """Return every `every`-th contact setting of a series, from the config's towards the rigid limit."""
+    """Return every n-th contact setting of a series (n is `every`), from that of the config to the most rigid one."""
     count, ratio, powers = SERIES_SETTINGS[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]

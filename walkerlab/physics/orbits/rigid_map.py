@@ -460,6 +460,15 @@ class SimilarWalker(NamedTuple):
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
 
+    def ground_after_push(self, z: Floats, push_N_s: float, steps: int, swing: int) -> tuple[float, float]:
+        # Negative values mean that the ground would have to pull.
+        walker = self.leg_swing(swing).walker
+        start = state_on_section(walker, z)
+        pushed = as_state(push_at_hip(walker, start, push_N_s / self.units.impulse))
+        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
+        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
+        return impulse * self.units.impulse, walk.min_normal_force * self.units.force
+
     def differentiate_walk(
         self, stepper: RigidStepper, z: Floats, heights_m: Floats, along: Floats, times_s: Floats, kicked: bool
     ) -> VariedWalk | None:
@@ -621,15 +630,7 @@ class RigidMap(StepMap):
         self, z: Floats, p: float, push_N_s: float, steps: int, swing: int = 0
     ) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
-        # Negative values mean that the ground would have to pull.
-        unit = valid(self._unit_at(p))
-        walker = unit.leg_swing(swing).walker
-        units = unit.units
-        start = state_on_section(walker, z)
-        pushed = as_state(push_at_hip(walker, start, push_N_s / units.impulse))
-        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
-        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
-        return impulse * units.impulse, walk.min_normal_force * units.force
+        return valid(self._unit_at(p)).ground_after_push(z, push_N_s, steps, swing)
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         unit = valid(self._unit_at(p))

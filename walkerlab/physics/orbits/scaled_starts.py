@@ -99,7 +99,7 @@ def scaled_starts(
     steps: int,
     gait: tuple[tuple[float, float], ...] | None,
 ) -> ScaledStarts:
-    """Build the scaled starts of a scene. `start_of` is linear in the factors of the two angular velocities."""
+    """Build the scaled starts of a scene. `start_of` is linear in the factors for the two angular velocities."""
     still = start_of(0.0, 0.0)
     swing = start_of(1.0, 0.0)
     stance = start_of(0.0, 1.0)
@@ -132,7 +132,7 @@ def margins(
 ) -> list[Margin]:
     """Find how far the velocities of a start may be scaled, alone and together, until it no longer leads to walking.
 
-    around   factors of the velocities of swing and stance leg that lead to walking
+    around   factors for the velocities of swing and stance leg that lead to walking
     largest  largest factor tried
     """
     # Factors are `step` apart until one fails. Then the last interval is bisected.
@@ -203,10 +203,10 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Results of walks over factors of both velocities. A row has the same factor for the stance leg's velocity."""
+    """Results of walks over factors for both velocities. A row has a single factor for the stance leg's velocity."""
 
-    swing: Floats  # (columns,) factors of the swing leg's velocity
-    stance: Floats  # (rows,) factors of the stance leg's velocity
+    swing: Floats  # (columns,) factors for the swing leg's velocity
+    stance: Floats  # (rows,) factors for the stance leg's velocity
     outcome: Integers  # (rows, columns)
     steps: Integers  # (rows, columns)
     settled: Integers  # (rows, columns) 1 if the last step matches the gait

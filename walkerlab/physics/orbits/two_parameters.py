@@ -179,7 +179,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, a stable one if possible. Without any it is None."""
+    """Interpolate a period-1 gait, if possible a stable one, from the branches at each value. None means no gait."""
     gaits = list[Floats | None]([None] * len(values))
     stable = np.zeros(len(values), bool)
     for branch in branches:

@@ -283,7 +283,7 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
     """Compute, for each error estimate, the sum of the squared ratios of error to tolerance.
 
-    method  anything with rtol and atol
+    method  object that has the tolerances rtol and atol
     """
     error_5 = 0.0
     error_3 = 0.0

@@ -19,7 +19,7 @@ State = tuple[float, ...]
 
 @dispatch_by_type
 def block(system: Any) -> Any:
-    """Return a value whose length, fixed at compile time, is the block size of loops over the state. It divides n."""
+    """Return a value whose length is the block size of loops over the state: fixed at compile time, a divisor of n."""
 
 
 @dispatch_by_type

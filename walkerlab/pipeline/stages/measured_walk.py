@@ -23,8 +23,8 @@ from walkerlab.exchange.columns import (
     unit_value,
 )
 from walkerlab.exchange.leg_angles import mend_angles, read_leg_angles
-from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
+from walkerlab.exchange.touches import sums_at_jumps
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, RecordedSteps, divide_into_steps, is_plausible, sum_over_level
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import (

@@ -1,8 +1,7 @@
 """Stage `recorded-walk`: read a walk recorded elsewhere, and store it like a computed walk."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,10 @@ from walkerlab.config.recording import RecordedFile
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import LEG_QUANTITIES, WALKER_QUANTITIES, RecordedWalk, as_walk
-from walkerlab.exchange.leg_angles import mend_angles
-from walkerlab.exchange.rate_jumps import noise_of
+from walkerlab.exchange.leg_angles import describe_doubts, mend_angles
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
-from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, find_tilt
+from walkerlab.exchange.walk_in_steps import RecordedSteps, correct_tilt, divide_into_steps
 from walkerlab.outcome import Outcome
-from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import TIME_LABELS, leg_labels, step_columns, variables_over_time
 from walkerlab.pipeline.store import artifact
@@ -26,8 +23,6 @@ from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
-
-NOISY_RATIO = 0.02  # above this ratio of noise to amplitude, times of single steps are wrong by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -44,11 +39,11 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     block = config.recording
     assert block is not None, "the stage requires the block"
     progress.start("recorded-walk", 1)
-    walk = read_walk(block, config.slope_rad)
     model = rigid_walker(config)
+    walk = read_walk(block, config.slope_rad)
     if block.camera_tilt_deg == "free":
         walk = correct_tilt(walk, model)
-    doubts = list(doubts_about(walk))
+    doubts = list(describe_doubts(walk))
     # Doubts are reported first, because noise may make the division into steps fail.
     for doubt in doubts:
         progress.note(doubt)
@@ -57,30 +52,6 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
         progress.note(doubt)
     progress.advance()
     return content_of(block, config, walk, steps, [*doubts, *steps.doubts])
-
-
-def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Find the camera's tilt from the jumps of the leg rates at heel strikes, and return the walk without it."""
-    tilt = find_tilt(walk, model)
-    upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
-    doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
-    return replace(walk, quantities={**walk.quantities, **upright}, doubts=(*walk.doubts, doubt))
-
-
-def doubts_about(walk: RecordedWalk) -> Iterator[str]:
-    """Yield a sentence for each reason to doubt the steps: odd angles, noise, and columns or samples that were not
-    used."""
-    yield from walk.doubts
-    angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
-    noise = noise_of(angles)
-    amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
-    if noise > NOISY_RATIO * amplitude:
-        yield (
-            f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
-            "heel strikes, and so periods and lengths of single steps, are uncertain."
-        )
-    for name, reason in walk.left_out.items():
-        yield f"Not used: {name}: {reason.removesuffix('.')}."
 
 
 def read_walk(block: RecordedFile, slope_rad: float) -> RecordedWalk:
