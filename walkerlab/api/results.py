@@ -120,7 +120,7 @@ class Result:
 
     @property
     def advice(self) -> str:
-        """What to try if there is no answer, otherwise empty.
+        """Advice on what to try if there is no answer, otherwise empty.
 
         >>> find_gait(slope_deg=-1).advice.partition(",")[0]
         'Let the slope descend in walking direction (slope_deg above 0)'

@@ -140,7 +140,7 @@ class Contact(Block):
         return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
-        """Of two units, such as `mm or m`, return the one that this block uses."""
+        """Return the unit that this block uses, of two such as `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def to_si(self) -> Self:

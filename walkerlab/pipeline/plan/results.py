@@ -138,7 +138,7 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """If a step reuses the result of another run, link or copy its file into this folder.
+        """Link or copy the file of a result into this folder if the step reuses it from another run.
 
         Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
         """

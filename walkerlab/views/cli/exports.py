@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """Where to write an export, in which format and size."""
+    """File, format and size of an export."""
 
     to: str | None  # format, or file name if `output` is None
     output: Path | None  # file; None derives its name from the run

@@ -30,7 +30,7 @@ class Cell:
 
     @property
     def datum(self) -> Any:
-        """What a file stores for the cell: the value that the text shows or, without one, the text, or None if that is
+        """Content of the cell in a file: the value that the text shows or, without one, the text, or None if that is
         empty."""
         if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
             return self.value
