@@ -1,9 +1,10 @@
-"""Run the ADAMS files of kneed walkers in the tests' reader, and compare the walks with those of our contact model.
+"""Simulate the ADAMS files of kneed walkers with the reader of the tests, and compare the walks with the contact model.
 
 Usage: python scripts/adams_knees.py [WALKERS, 10 by default] [STRIDES, 3 by default]
 
-Each random walker is exported with `--law functions`. The reader runs its dataset (.adm) and command file (.acf) from
-their texts alone. The script prints the largest differences of touch times and of times at which knees lock.
+Each random walker is exported with `--law functions`. The reader simulates the walk from nothing but the text of the
+dataset (.adm) and of the command file (.acf). The script prints the largest differences of touch times and of times at
+which knees lock.
 """
 
 import sys

@@ -15,7 +15,7 @@ EXAMPLES = re.compile(r"(^>>> .*?)(?=\n\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
 class Columns(Extension):
-    """Reformats every docstring before it is put on a page."""
+    """Extension that reformats every docstring before it is put on a page."""
 
     def on_instance(self, *, obj: Object, **_: Any) -> None:
         """Reformat the docstring of one object."""
@@ -24,7 +24,7 @@ class Columns(Extension):
 
 
 def as_markdown(text: str) -> str:
-    """A docstring of this project as Markdown.
+    """Convert a docstring of this project to Markdown.
 
     >>> print(as_markdown("Walk.\\n\\nslope_deg  positive downhill,\\n           deg\\n\\n>>> 1 + 1\\n2"))
     Walk.

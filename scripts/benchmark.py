@@ -2,8 +2,8 @@
 
     python scripts/benchmark.py [--quick] [--write]
 
-Everything is warm, and times are medians. Other programs are named with their versions. With --write the table goes
-into docs/performance.md. With --quick each time is the median of fewer repeats.
+All code is compiled beforehand, and times are medians. Other programs are named with their versions. With --write the
+table goes into docs/performance.md. With --quick each time is the median of fewer repeats.
 """
 
 from __future__ import annotations
@@ -69,20 +69,20 @@ from walkerlab.scene.rigid import rigid_walker
 PRINTED_START = (0.1674, -0.60, -0.84)  # theta_2 and the velocities of x_p, eq. 11
 STEPS = 10
 BUDGET = 2_000_000
-PEER_STARTS, PEER_STEPS = 24, 12  # number of a basin's starts, and of steps from each, that a library simulates
+PEER_STARTS, PEER_STEPS = 24, 12  # number of starts in a basin that a library simulates, and number of steps from each
 LADDER = tuple(10.0 ** (-half / 2) for half in range(6, 26))
 PAGE = Path(__file__).parent.parent / "docs" / "performance.md"
 PART = re.compile(r"(<!-- made by scripts/benchmark\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 PEER_LEVELS = {"scipy-radau": 2e-6, "scipy-lsoda": 1e-4}
 RADAU_WHERE_BARS_WERE_SET_S = 0.567
-"""Time of SciPy's Radau for the contact walk on the machine on which the bars in seconds were set."""
+"""Time that SciPy's Radau took for the contact walk on the machine for which the bars in seconds were chosen."""
 FEW = " Few repeats (--quick)."
 MET, MISSED, STRETCH = "bar met", "bar missed", "stretch met"
 
 
 @dataclass(frozen=True)
 class Line:
-    """One claim: the work, the measured value, the bar, and the verdict."""
+    """A claim with its measured value, the bar that the value must meet, and the verdict."""
 
     work: str
     measured: str
@@ -109,7 +109,7 @@ class Stopwatch:
         self.repeats, self.longest_s = repeats, longest_s
 
     def __call__(self, work: Callable[[], Any]) -> float:
-        """Return the median time (s) of calls, after one call that is not counted."""
+        """Return the median time of a call (s). A first call is not counted."""
         work()
         times: list[float] = []
         while len(times) < self.repeats and (len(times) < 3 or sum(times) < self.longest_s):
@@ -122,7 +122,7 @@ class Stopwatch:
 def cheapest(
     trial: Trial, reference: Reference, method: str, level: float, watch: Stopwatch, ladder: Sequence[float]
 ) -> Timed | None:
-    """Return the run of a method at the loosest tolerance with an error of at most `level`, or None."""
+    """Return the run of a method at the loosest tolerance whose error is at most `level`, or None if there is none."""
     for tolerance in ladder:
         walk = trial.prepare(method, tolerance, BUDGET)
         run = walk()
@@ -157,7 +157,7 @@ def at_most(work: str, value: float, unit: str, bar: float, stretch: float) -> L
 
 
 def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
-    """Measure ten rigid steps: time at a given error, and smallest error."""
+    """Measure ten rigid steps: the time that a given error costs, and the smallest error that is reached."""
     trial = printed_trial()
     reference = reference_for(trial)
     ours = cheapest(trial, reference, "dop853", 1e-9, watch, LADDER)
@@ -177,7 +177,7 @@ def rigid_lines(watch: Stopwatch) -> Iterator[Line]:
 
 
 def contact_peers(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> dict[str, Timed | None]:
-    """Time SciPy's stiff solvers on the contact walk, each at an error that it reaches."""
+    """Time SciPy's stiff solvers on the contact walk, each at an error that it can reach."""
     return {peer: cheapest(trial, reference, peer, level, watch, LADDER[2:]) for peer, level in PEER_LEVELS.items()}
 
 
@@ -228,7 +228,7 @@ def contact_trial_of(config: Config) -> ContactTrial:
 
 
 def chosen_gait(config: Config) -> RigidGait:
-    """Return the rigid gait of a config that has one."""
+    """Return the rigid gait of a config, which must have one."""
     gait = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     assert gait is not None, "there is a gait"
     return gait
@@ -266,7 +266,7 @@ def branches_of(model: str, asked: FamilyQuestion) -> None:
 
 
 def rhs_lines(times: dict[str, float]) -> Iterator[Line]:
-    """Compare the right-hand sides, and the assembled one with Appendix A's."""
+    """Compare the times of all right-hand sides, and that of the assembled compass with that of Appendix A."""
     typed, rigid, contact = times["Appendix A"], times["rigid"], times["contact"]
     yield at_most("right-hand side, rigid", rigid, "ns", 40, 20)
     yield at_most("right-hand side, contact", contact, "ns", 100, 60)
@@ -360,7 +360,9 @@ def process_line(repeats: int) -> Line:
 
 
 def join_rows(trial: ContactTrial, reference: Reference, watch: Stopwatch) -> list[list[str]]:
-    """Tabulate error and work with solver steps that end at switching points of the force law, and without."""
+    """Tabulate error and work of solvers whose steps end at switching points of the force law, and of solvers whose
+    steps do not.
+    """
     smooth = replace(trial, ground=trial.ground._replace(frame=trial.ground.frame._replace(locate_switching=False)))
     rows = []
     for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8):

@@ -10,7 +10,7 @@ PART is one of
     combined            COUNT gaits (20) with a mistake, in conventions that are not stated
     odd                 COUNT odd files (200)
 
-FIRST skips the mistakes before it. Exits 1 if an answer is wrong. States with mistakes come from the integration in
+FIRST is the mistake to begin with. Exits 1 if an answer is wrong. States with mistakes come from the integration in
 tests/evidence/check, not from the code that judges.
 """
 
@@ -38,7 +38,7 @@ KINDS = {
     "kneed": (mistaken_knees.MISTAKES, mistaken_knees.step, mistaken_knees.random_knees, mistaken_knees.config_of),
 }
 DIGITS = (4, 6, 10)
-MOST_WALKERS = 25  # maximum number of walkers to draw; with some mistakes, few walkers have a gait
+MOST_WALKERS = 25  # maximum number of walkers to draw for a mistake, because with some mistakes few walkers have a gait
 
 
 def report(*words) -> None:
@@ -50,7 +50,7 @@ def causes(answer: dict) -> list[str]:
 
 
 def mistaken_gaits(kind: str, place: int, mistake: dict):
-    """Yield gaits of random walkers with a mistake, leaving out walkers that then have none."""
+    """Yield gaits of random walkers with a mistake. Walkers that have no gait with the mistake are skipped."""
     _, step, make, config_of = KINDS[kind]
     for legs, start in islice(walkers(place, make, config_of), MOST_WALKERS):
         found = gait_with(legs, start, mistake, step)
@@ -67,7 +67,7 @@ def planted(kind: str, count: int, first: int) -> int:
             for digits in DIGITS:
                 answer = answer_to(config, *found, digits)
                 told = causes(answer)
-                # With few digits, several causes may fit.
+                # If few digits are printed, several causes may explain them.
                 named = any(words in what for what in told) and (digits == min(DIGITS) or len(told) == 1)
                 tally[digits] += named
                 if not named:
@@ -104,7 +104,7 @@ def unlisted(count: int) -> int:
 
 
 def in_conventions(count: int, mistakes: bool) -> int:
-    """Print gaits in random conventions, with or without a planted mistake, and look for both in the answers."""
+    """Print gaits in random conventions, with or without a planted mistake, and check that the answers name both."""
     wrong = 0
     generator = random.Random(300)
     words, mistake = "", {}

@@ -4,8 +4,8 @@
     python scripts/clusters.py --only slurm
 
 The script starts munge, slurmctld and slurmd on this machine's loopback interface, without accounting, in a temporary
-folder, and ends them again. On Debian: apt-get install slurm-wlm munge; run as root. If they or the extras `slurm` and
-`dask` are missing, it says so and skips that part. It exits with 1 if a check fails.
+folder, and ends them again. On Debian: apt-get install slurm-wlm munge; run as root. If they or one of the extras
+`slurm` and `dask` are missing, the script says so and skips that part. It exits with 1 if a check fails.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--only", choices=("slurm", "dask"))
     only = parser.parse_args().only
-    # Jobs are started by other programs, which pass on nothing but the environment.
+    # Other programs start the jobs. Only the environment reaches them.
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(TOY), os.environ.get("PYTHONPATH", ""))))
     sys.path.insert(0, str(TOY))
     warnings.simplefilter("ignore")
@@ -114,7 +114,7 @@ def passes(check: Any) -> bool:
 
 @contextlib.contextmanager
 def slurm_of_one_node() -> Iterator[None]:
-    """Run Slurm on the loopback interface, for processes that start in the `with` block."""
+    """Run Slurm on the loopback interface for the processes that a `with` block starts."""
     with tempfile.TemporaryDirectory(prefix="slurm-") as name, contextlib.ExitStack() as stack:
         folder = Path(name)
         for below in ("state", "spool"):
@@ -168,7 +168,7 @@ def said(*command: str) -> str:
 
 
 def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.0, **order: Any) -> Any:
-    """Sweep the toy stage, some of whose points end their process."""
+    """Sweep the toy stage, in which some points kill their own process."""
     from toy_sweep.sweep_pipeline import GRAPH
 
     from walkerlab.config.loader import load
@@ -184,7 +184,7 @@ def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.
 
 
 def reasons(sweep: Any) -> dict[int, str]:
-    """Return the reason, by seed, why points have no answer."""
+    """Return for each seed without a result the reason."""
     group = sweep.content[""]
     rows = zip(group["seed"].tolist(), group["status"].tolist(), group["reason"].tolist(), strict=True)
     return {seed: reason for seed, status, reason in rows if status != "answered"}
@@ -197,7 +197,7 @@ def a_sweep_is_that_of_this_machine(folder: Path) -> None:
 
 
 def a_time_limit_loses_nothing(folder: Path) -> None:
-    """Jobs with a limit of one minute compute work of two minutes. Slurm reserves half a minute for their end."""
+    """Check that a sweep of two minutes survives a time limit of one minute per job, which ends half a minute early."""
     os.environ["TOY_SWEEP_PAUSE"] = "3"
     began = time.monotonic()
     try:
@@ -211,7 +211,7 @@ def a_time_limit_loses_nothing(folder: Path) -> None:
 
 
 def a_dead_job_is_noticed(folder: Path) -> None:
-    """Seed 13 kills its job, of which Slurm keeps no account."""
+    """Check that a job is reported as dead if seed 13 kills it, although Slurm keeps no accounts here."""
     from walkerlab.pipeline.sweeps import engines
 
     assert "disabled" in subprocess.run(["sacct"], capture_output=True, text=True, check=False).stderr
@@ -237,12 +237,12 @@ def a_cancelled_job_is_run_again(folder: Path) -> None:
 
 
 def a_nanny_kills_only_the_greedy_point(folder: Path) -> None:
-    """Seed 29 needs more memory than its worker may have, so Dask's nanny kills that worker."""
+    """Check that only seed 29 fails: it needs more memory than its worker may have, so Dask's nanny kills it."""
     import dask
 
-    # Dask takes this limit, which Linux ignores, for the memory that its workers share.
+    # Dask divides this limit among its workers as if it were the machine's memory. Linux ignores it.
     resource.setrlimit(resource.RLIMIT_RSS, (1 << 30, 1 << 30))
-    # Let a task fail when its first worker dies, which takes a quarter of the time.
+    # A task fails as soon as its first worker dies. With Dask's default it would take four times as long.
     dask.config.set({"distributed.scheduler.allowed-failures": 0})
     os.environ["TOY_SWEEP_GREED"] = str(2 << 30)
     try:

@@ -42,7 +42,8 @@ BUILT_IN = (
 WALKS = ("fixedpoint", "simulate", "contact-sim")
 RIGID = ("fixedpoint", "simulate")
 CONTACT = ("contact-sim",)
-RIGID_ALLOWED = 0.01  # factor on the tolerances for the rigid model, which is not stiff and so solved more accurately
+# The rigid model is not stiff, so it is solved more accurately. This factor makes its tolerances tighter.
+RIGID_ALLOWED = 0.01
 SHOWN = 12  # maximum number of differences printed for a case
 
 
@@ -56,14 +57,14 @@ class Version:
     cache: Path
 
     def environment(self) -> dict[str, str]:
-        """Environment of its processes."""
+        """Environment of the version's processes."""
         given = {**os.environ, "WALKERLAB_CACHE": str(self.cache), "COLUMNS": "100"}
         return given | ({"PYTHONPATH": str(self.checkout)} if self.checkout else {})
 
     def sources_digest(self) -> str:
         """Return the digest (hex) of the package's sources and built-in configs, wherever they are installed."""
         asked = "import walkerlab, pathlib; print(pathlib.Path(walkerlab.__file__).parent)"
-        # a folder without a package, because Python looks there first
+        # Python looks for packages in the current folder first, so run in one that has none.
         there = {"cwd": tempfile.gettempdir(), "env": self.environment()}
         package = Path(subprocess.check_output([self.python, "-c", asked], text=True, **there).strip())
         files = [*package.rglob("*.py"), *package.rglob("*.yaml"), *(package.parent / "configs").glob("*.yaml")]
@@ -75,16 +76,16 @@ class Version:
 
 @dataclass(frozen=True)
 class Case:
-    """A config with changes, and the commands that run on it in turn, in a folder of their own."""
+    """A config with changes, and the commands that run on it one after another in a separate folder."""
 
     commands: tuple[str, ...]
     config: str
     changes: tuple[str, ...] = ()
-    looser: float = 1.0  # factor on all tolerances
+    looser: float = 1.0  # factor by which all tolerances are multiplied
 
     @property
     def name(self) -> str:
-        """Name of the case, which is valid as a folder name."""
+        """Name of the case, also for its folder."""
         changes = (re.sub(r"^[\w.]+\.", "", change) for change in self.changes)
         return re.sub(r"[^\w.=@+-]+", "_", "@".join((self.commands[-1], self.config, *changes)))
 
@@ -96,7 +97,7 @@ class Case:
 
 
 def cases() -> Iterator[Case]:
-    """Return all cases, those that take longest first."""
+    """Return all cases, beginning with those that take longest."""
     yield from long_cases()
     for name in BUILT_IN:
         yield Case((*WALKS, "compare"), name)
@@ -136,7 +137,7 @@ def family(config: str, over: str, first: float, last: float, *changes: str) -> 
 
 
 def rigid_cases() -> Iterator[Case]:
-    """Yield gaits and rigid walks: steep slopes, starts that fall, and all kinds of walkers and methods."""
+    """Yield cases of gaits and rigid walks: steep slopes, starts that fall, and all kinds of walkers and methods."""
     for slope in (0.2, 4.5, 8.0, 40.0):
         yield Case(RIGID, "paper", (f"slope_deg={slope}",))
     yield Case(("fixedpoint",), "kneed", ("slope_deg=12",))
@@ -154,7 +155,7 @@ def rigid_cases() -> Iterator[Case]:
 
 
 def contact_cases() -> Iterator[Case]:
-    """Yield walks of the contact model: walkers, knees, terrains, stances, laws, methods and outcomes."""
+    """Yield cases of the contact model: walkers, knees, terrains, stances, laws, methods and outcomes."""
     for terrain in ("checkerboard", "after-mid-swing", "plane"):
         for stance in ("free", "pinned"):
             yield Case(CONTACT, "slope-3deg", (f"contact.terrain={terrain}", f"contact.stance={stance}"))
@@ -186,7 +187,7 @@ def contact_cases() -> Iterator[Case]:
 
 
 def refused_cases() -> Iterator[Case]:
-    """Yield questions without an answer: refused configs, and walkers without a gait."""
+    """Yield cases that end in an error: configs that are refused, and walkers without a gait."""
     for changes in (
         ("walker.leg_masss_kg=3",), ("walker.leg_mass_kg=-3",), ("slope_deg=1", "slope_rad=0.1"),
         ("contact.terrain=grass",), ("start=[1, 2]",), ("solver.contact.method=radau6",), ("strides=0",),
@@ -202,7 +203,7 @@ def refused_cases() -> Iterator[Case]:
 
 
 def answers_of(version: Version, case: Case, folder: Path, text: bool) -> dict[str, Any]:
-    """Return the answers of a version to the commands of a case, from the folder if they are there already."""
+    """Return what a version answers to the commands of a case. Answers that are already in the folder are reused."""
     asked, kept = [*case.lines(), str(text)], folder / "answers.json"
     if kept.exists():
         told: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
@@ -221,7 +222,7 @@ def answers_of(version: Version, case: Case, folder: Path, text: bool) -> dict[s
 
 
 def answer(version: Version, command: list[str], folder: Path) -> dict[str, Any]:
-    """Return the exit code and the output, without the folder's name. JSON is parsed."""
+    """Return the exit code and the output of a command, with the name of the folder removed. JSON is parsed."""
     done = subprocess.run(command, capture_output=True, text=True, env=version.environment(), cwd=folder)
     said = [text.replace(str(folder), "FOLDER") for text in (done.stdout, done.stderr)]
     if "--json" in command and said[0].startswith("{"):
@@ -237,14 +238,14 @@ def as_text(command: str) -> str:
 
 
 def artifacts_in(folder: Path) -> dict[str, Path]:
-    """Return stored results by name, without digests in the names and without chunks of merged results."""
+    """Return stored results by name, with digests removed from the names. Chunks of merged results are skipped."""
     files = sorted((folder / "runs").rglob("*.h5"))
     named = {re.sub(r"-[0-9a-f]{8}\b", "", str(file.relative_to(folder / "runs"))): file for file in files}
     return {name: file for name, file in named.items() if "sweep-chunks" not in name}
 
 
 def differences_in(case: Case, answers: Sequence[dict[str, Any]], folders: Sequence[Path]) -> Iterator[Difference]:
-    """List all differences between the answers of two versions to a case, however small."""
+    """List all differences, however small, between the answers of two versions to a case."""
     for command in case.lines():
         allowed = case.looser * (RIGID_ALLOWED if command[0] in RIGID else 1.0)
         for asked in (command[0], as_text(command[0])):

@@ -1,4 +1,4 @@
-"""Compare random walks on compliant ground with a plain integration, written for the tests, up to numerical errors.
+"""Compare random walks on compliant ground with the plain integration in the tests, within numerical errors.
 
     python scripts/contact_campaign.py                 # 200 walks, seeds 0 to 199
     python scripts/contact_campaign.py --walks 6 --seed 3
@@ -17,10 +17,10 @@ mm/s; feet from points to balls of 0.3 m; slopes from 0.3 to 4 degrees for strai
 limbs and release are drawn too; and starts about the gait. Falls, trips, slides, flights and feet that come down on
 bent knees are among the walks.
 
-Compared are how a walk ends and its quantities: times (touches, locks of knees, end), places of touches, slips,
-rolling, work lost by channel, and mechanical energy at the end. Each may differ by five times its numerical error: that
-of the plain integration (tests/physics/hybrid/plain_walk.py), which is what halving its step changes, and our own. We
-walk each at the config's tolerances, and at a hundred and ten thousand times tighter ones. The error of the
+The script compares how a walk ends, and its quantities: times (touches, locks of knees, end), positions of touches,
+slips, rolling, work lost by channel, and mechanical energy at the end. Each may differ by five times its numerical
+error: that of the plain integration (tests/physics/hybrid/plain_walk.py), which is what halving its step changes, and
+our own. We walk each at the config's tolerances, and at a hundred and ten thousand times tighter ones. The error of the
 first is its change to the second. Of the others it
 is the smallest change between any two of the three: otherwise a fault that comes and
 goes with the tolerance would vouch for itself. The energy balance of each has to close as well. Prints a table in
@@ -57,11 +57,11 @@ from walkerlab.physics.hybrid.contact_result import RESIDUAL_FACTOR, ContactWalk
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-TIMES = 5.0  # walks may differ by this multiple of their numerical errors
-TIGHTER = (1.0, 1e-2, 1e-4)  # factors on the config's tolerances
+TIMES = 5.0  # Walks may differ by this multiple of their numerical errors.
+TIGHTER = (1.0, 1e-2, 1e-4)  # factors by which the tolerances of the config are multiplied
 BALANCED = 5.0  # residual of an energy balance over rtol x (energy + work exchanged); fails at RESIDUAL_FACTOR
 BUDGET = 5_000_000
-PLAIN_STEPS_S = (4e-5, 5e-6)  # the second for walks that seem to differ with the first
+PLAIN_STEPS_S = (4e-5, 5e-6)  # The second one is for walks that differ with the first.
 PLANE_MEASURE_M = 0.45  # reference length for judging steps on ground without pads
 TERRAINS = {
     "checkerboard": plain_walk.CHECKERBOARD,
@@ -71,28 +71,29 @@ TERRAINS = {
 RATIOS = (0.05, 0.3, 1.0, 3.0)  # ratios of damping to critical damping
 LIGHT = (0.02, 0.04, 0.07, 0.12, 0.2, 0.3, 0.4)  # the same for feet that bounce
 SINKS_MM = (0.001, 0.01, 0.06, 0.06, 0.2, 1.0)  # static penetrations
-# of every nine seeds: knees on ground that is damped far above critically from the first touch on, and so lets a foot
-# go while it is still inside; the instant of its lift is hard to hit there
+# One of every nine seeds has knees on ground that is damped far above critically from the first touch on. Such ground
+# lets go of a foot that is still inside, and the instant of lift is hard to locate.
 LOSSY = (2, 5)
 SLOPE_GAIT = (0.169539, -0.6057394, -0.861714)  # at one degree: stance angle, velocities
-KNEED_GAIT = (0.2385854603, -0.0571481063, -1.1095873312)  # of the built-in walker, likewise from the slope's normal
+# gait of the built-in kneed walker, with angles from the slope's normal, too
+KNEED_GAIT = (0.2385854603, -0.0571481063, -1.1095873312)
 KNEED_SLOPE = 0.0504
-# quantities of a walk, by the unit of the walker's own that their errors are natural in
+# Quantities of a walk, grouped by the natural unit of the walker in which their errors are measured.
 TAU, LEG, WEIGHT = "pendulum time", "leg length", "weight times leg length"
 UNITS = {
     "times (s)": TAU, "places (m)": LEG, "slip (m)": LEG, "rolling (m)": LEG, "lost (J)": WEIGHT, "energy (J)": WEIGHT,
 }  # fmt: skip
-Quantities = dict[str, Any]  # arrays by the names above
+Quantities = dict[str, Any]  # values by the names above
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A walk to compare: a built-in config, changes of it, and a start of the rigid model."""
+    """A walk to compare: a built-in config, changes to it, and a start state of the rigid model."""
 
     base: str
     sets: tuple[str, ...]
     start: tuple[float, ...]
-    heights_m: tuple[float, ...] = (0.0,)  # heights of the footholds, beginning with that of the start
+    heights_m: tuple[float, ...] = (0.0,)  # heights of the footholds, beginning with the first stance foot's
 
     @property
     def ground(self) -> str:
@@ -118,7 +119,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Compared:
-    """A drawn walk, computed both ways."""
+    """A random walk, computed by the package and by the plain integration."""
 
     drawn: Drawn
     expected: str
@@ -145,7 +146,8 @@ def compass(seed: int, ratios: tuple[float, ...] = RATIOS) -> Drawn:
     die = random.Random(seed)
     slope = die.choice((0.3, 0.7, 1.0, 1.0, 2.0, 2.8, 4.0))
     exponent = die.choice((1.0, 1.3, 1.5, 2.2, 2.2, 3.0))
-    # The depth to which a foot sinks is drawn, so that the ground carries the walker for every exponent.
+    # Draw the depth to which a foot sinks rather than the stiffness, so that the ground carries the walker for every
+    # exponent.
     depth_mm = die.choice(SINKS_MM)
     stiffness = 196.0 / depth_mm**exponent
     ratio = die.choice(ratios)
@@ -223,7 +225,7 @@ def both(seed: int) -> Drawn:
 
 
 def light(seed: int) -> Drawn:
-    """Draw a walker on lightly damped ground, on which feet bounce and the clipped force vanishes again and again."""
+    """Draw a walker on lightly damped ground, where feet bounce and the clipped force vanishes again and again."""
     return kneed(seed, LIGHT) if seed % 3 == 2 else compass(seed, LIGHT)
 
 
@@ -241,17 +243,17 @@ def driven(seed: int) -> Drawn:
 
 
 def uneven(seed: int) -> Drawn:
-    """Draw a walker, every other one driven, on footholds of random heights from a tenth to 1e-4 of a leg."""
+    """Draw a walker on footholds whose random heights range from a tenth to 1e-4 of a leg. Every other walker is
+    driven.
+    """
     one, die = (driven if seed % 2 else both)(seed), random.Random(seed)
     share = die.choice((1e-1, 1e-2, 1e-3, 1e-3, 1e-4))
     return replace(one, heights_m=(0.0, *(die.gauss(0.0, share) for _ in range(4))))
 
 
 def passing(seed: int) -> Drawn:
-    """Draw a walker on uneven planes, started too slowly to pass upright, so that its feet pass again inside the
-    ground.
-
-    Most have point feet, which come down on each other as they pass.
+    """Draw a walker on uneven planes. It starts too slowly to get past the upright position, so its feet pass each
+    other again inside the ground. Most walkers have point feet, which come down on each other as they pass.
     """
     one, die = uneven(seed), random.Random(seed)
     angles, rates = np.array(one.start).reshape(2, -1)
@@ -272,7 +274,7 @@ def unequal(seed: int) -> Drawn:
         "leg_length_m": 3e-3,
         "length_m": 3e-3,
         "foot_radius_m": 0.2,
-    }  # largest relative changes; 0.1 for all other keys
+    }  # largest relative changes; all other keys change by at most 0.1
 
     def beside(block: Any, *names: str) -> str:
         shares = ((name, die.uniform(-1.0, 1.0) * near.get(name, 0.1)) for name in names)
@@ -295,7 +297,9 @@ def unequal(seed: int) -> Drawn:
 
 
 def explicit(seed: int) -> Drawn:
-    """Draw a walker on lightly damped ground for dop853, whose energy balance has to follow long high-order steps."""
+    """Draw a walker on lightly damped ground for dop853. Its long steps of high order make the energy balance harder to
+    close.
+    """
     one = light(seed)
     return replace(one, sets=(*one.sets, "solver.contact.method=dop853"))
 
@@ -343,7 +347,7 @@ def at_touch(walker: Any) -> bool:
 
 def plainly(scene: plain_walk.Plain, start: Any, pinned: bool, steps: int, step_s: float) -> plain_walk.Walked:
     """Return the walk of the plain integration."""
-    # the rigid model's stance leg is one body, whose angle and rate come second
+    # The stance leg is one body in the rigid model. Its angle and its rate come second.
     angles, rates = np.array(start).reshape(2, -1)
     straight = [0, 1] if angles.size == 2 else [0, 1, 2, 1]
     y = plain_walk.start(scene, angles[straight], rates[straight], pinned)
@@ -358,8 +362,8 @@ def of_plain(plain: plain_walk.Plain, walk: plain_walk.Walked) -> Quantities:
 
 
 def of_ours(plain: plain_walk.Plain, plainly: plain_walk.Walked, walk: ContactWalkResult) -> Quantities:
-    """Return the compared quantities of our walk. Its energy is that of the plain formula, on the ground of the plain
-    walk's end.
+    """Return the compared quantities of our walk. Its energy is computed by the plain formula, with the ground as it is
+    at the end of the plain walk.
     """
     times = np.concatenate((walk.touch_time_s, walk.knee_strikes_s, [walk.end_time_s]))
     lost = walk.dissipated_J[: len(plain_walk.CHANNELS)]
@@ -371,9 +375,10 @@ def of_ours(plain: plain_walk.Plain, plainly: plain_walk.Walked, walk: ContactWa
 
 
 def rounding(plain: plain_walk.Plain, rounds: int) -> dict[str, float]:
-    """Return the largest effect of rounding on each quantity: that of every step of the plain integration, added up.
+    """Bound the effect of rounding on each quantity by the sum over all steps of the plain integration.
 
-    Events are located to a time. Meanwhile the walker moves on by that fraction of a pendulum time, in its own units.
+    The time of an event is only known up to rounding. In that time the walker moves by the same fraction of its natural
+    units as the time is of a pendulum time.
     """
     tau, weight = (plain.leg / plain.gravity) ** 0.5, plain.gravity * plain.masses.sum()
     share = rounds * np.finfo(float).eps + EVENT_TIME / tau
@@ -398,9 +403,8 @@ def ours_at(scene: ContactScene, config: Config, drawn: Drawn, steps: int, tight
 
 
 def compare(drawn: Drawn, steps: int) -> Compared:
-    """Compute a drawn walk both ways.
-
-    A walk that differs is judged again with a shorter plain step, since halving may change little by luck.
+    """Compute a random walk both ways. If the walks differ, compare again with a shorter plain step, because halving
+    the step may change little by chance, which makes the numerical error too small.
     """
     long, short = PLAIN_STEPS_S
     one = compare_with(long, drawn, steps)
@@ -408,7 +412,7 @@ def compare(drawn: Drawn, steps: int) -> Compared:
 
 
 def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
-    """Compute a drawn walk both ways, with plain steps of at most `step_s` and of half of it."""
+    """Compute a random walk both ways, with plain steps of at most `step_s` and of half that length."""
     (config, scene), start = scene_of(drawn), drawn.start
     plain, pinned = plain_scene(config, scene.pitch_m, drawn.heights_m), scene.pinned
     coarse, fine = (plainly(plain, start, pinned, steps, h) for h in (step_s, 0.5 * step_s))
@@ -441,7 +445,7 @@ def apart(one: Quantities, other: Quantities) -> dict[str, float]:
 
 
 def largest(one: Any, other: Any) -> float:
-    """Return the largest difference between two rows of numbers."""
+    """Return the largest difference between two rows of numbers, or infinity if their lengths differ."""
     return float(np.max(np.abs(one - other), initial=0.0)) if one.size == other.size else float("inf")
 
 

@@ -2,9 +2,9 @@
 
     pip install CyRK==0.20.0 && python scripts/cyrk_peer.py
 
-Both use a compiled right-hand side. CyRK gets it as a function of numba, which is called through Python, as are its
-events. The impact is a Python function. Each method runs at the loosest tolerance, in half decades, whose end state is
-correct to 1e-9 rad and rad/s. The script prints medians of processor times, their ratio, and the errors.
+Both use a compiled right-hand side. CyRK calls it and the event functions, which numba has compiled, through Python.
+The impact is a Python function. Each method runs at the loosest tolerance, in half decades, whose end state is correct
+to 1e-9 rad and rad/s. The script prints medians of processor times, their ratio, and the errors.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from benchmark import BUDGET, printed_trial
 
 from walkerlab.evidence.paper.appendix_a import impact
 
-# rounded from two references that agree to 1e-36: see docs/numerics.md
+# Rounded from two references that agree to 1e-36, see docs/numerics.md.
 REFERENCE = np.array([-0.204388204282412, 0.169481619242526, -0.606147299375954, -0.861660164829674])
 ALLOWED = 1e-9
 TOLERANCES = 10.0 ** np.arange(-4.0, -13.5, -0.5)
@@ -55,7 +55,7 @@ def compiled_problem(compass: Any) -> tuple[Any, Any]:
 
 
 def cyrk_walk(trial: Any, method: str, rtol: float) -> Callable[[], Any]:
-    """Return a function that takes the steps with CyRK and returns the end state."""
+    """Return a function that simulates the steps with CyRK and returns the state at their end."""
     right_hand_side, event = compiled_problem(trial.compass)
     limit = 10.0 * np.sqrt(trial.compass.leg_length / trial.compass.gravity)
 

@@ -1,4 +1,4 @@
-"""Ways to damage a stored result: accidental ones, and deliberate ones with a new valid seal."""
+"""Ways to damage a stored result, either by accident or deliberately, with a new valid seal."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def overwrite(drawn: random.Random, data: bytes) -> bytes:
 
 
 def replace_all(drawn: random.Random, data: bytes) -> bytes:
-    """Replace the whole file."""
+    """Replace the whole file by something else."""
     return drawn.choice((b"", b"\x89HDF\r\n\x1a\n", b"text\n", drawn.randbytes(len(data))))
 
 

@@ -14,14 +14,16 @@ import numpy as np
 
 
 class Near(NamedTuple):
-    """Rule: numbers agree within a fraction of the largest of them, or within an absolute difference in SI."""
+    """Rule for ordinary numbers: they agree within a fraction of the largest of them, or within an absolute difference
+    in SI units.
+    """
 
     relative: float
     absolute: float
 
 
 class AsLarge(NamedTuple):
-    """Rule: numbers that are rounding or error estimates need only have the same order of magnitude, or be below the
+    """Rule for rounding and error estimates: numbers need only have the same order of magnitude, or lie below the
     floor.
     """
 
@@ -29,22 +31,23 @@ class AsLarge(NamedTuple):
     floor: float
 
 
-# Rules by a pattern for the path of a quantity or its last part. The first match counts, and None means no comparison.
-# Each allows about five times the effect that changing the equations by one rounding has in compare_versions.py.
+# Rules by a pattern for the path of a quantity or for the last part of its path. The first match counts, and None means
+# that the quantity is not compared. Each rule allows about five times the effect that a change of the equations by one
+# rounding has in compare_versions.py.
 RULES: tuple[tuple[str, Near | AsLarge | None], ...] = (
-    # times, durations and sources are not part of the answer
+    # Times, durations and sources are no part of an answer.
     (r".*wall.*|.*cpu.*|.*(_per_s|seconds)|(started|ended)_utc|.*_(digests?|keys?)|(package|library)_versions?", None),
     (r"command_line|platform|git_commit|summary_json|DIMENSION_LIST|REFERENCE_LIST", None),
-    # Results of other solvers in extreme cases, and used fractions of budgets, depend on rounding.
+    # What other solvers give in extreme cases depends on rounding, and so does the used fraction of a budget.
     (r".*/(ordinary\[\d+\]|measures\[\d+\]/(value|limit)).*", None),
-    # Counts of work depend on rounding if a step is only just accepted.
+    # Rounding changes counts of work if a solver step is only just accepted.
     (r"rejected.*", Near(0.1, 20.0)),
     (r".*(evaluations|accepted|jacobians|newton|solves|iterations).*|steps_tried|work", Near(0.04, 10.0)),
     (r".*residual.*|.*drift.*|.*rounding.*|.*(step_)?error|.*numerical.*|.*agreement.*", AsLarge(30.0, 1e-8)),
     (r".*lyapunov.*|exponent|.*uncertainty.*|.*attractor.*|.*chaotic.*", Near(0.2, 0.05)),
-    # a ratio to a force that goes through zero in a fall
+    # The ratio is to a force that goes through zero in a fall.
     (r"max_friction_ratio", Near(0.02, 1e-6)),
-    # quantities of the derivative of a step, and of searches that end when they are near enough
+    # These come from the derivative of a step, or from a search that ends when it is near enough.
     (r".*multiplier.*|.*radius.*|.*derivative.*|.*/orders/.*|.*factor.*|.*margin.*|.*distance.*", Near(1e-5, 1e-6)),
     # Contact is stiff, so forces and velocities amplify small differences in penetration.
     (r".*_N|.*penetration.*", Near(3e-5, 1e-5)),
@@ -60,7 +63,7 @@ HEX = re.compile(r"\b[0-9a-f]{8,}\b")
 
 @dataclass(frozen=True)
 class Difference:
-    """Two values that differ, and their difference in units of what is allowed."""
+    """Two values that differ, and their difference as a multiple of the allowed one."""
 
     name: str
     share: float  # fraction of the allowed difference; inf for NaN
@@ -93,7 +96,7 @@ def of_values(old: Any, new: Any, name: str, looser: float = 1.0) -> Iterator[Di
 
 
 def of_names(old: Any, new: Any, name: str) -> Iterator[Difference]:
-    """Yield names that only one side has."""
+    """Yield a difference for each name that only one side has."""
     for key in sorted(set(old) ^ set(new)):
         if rule_for(key) is not None:
             yield Difference(f"{name}/{key}", math.inf, GONE if key in old else NEW)
@@ -124,8 +127,8 @@ def spoken(number: str) -> float:
 
 
 def last_digit(number: str) -> float:
-    """Return the value of one unit of a printed number's last digit, or 0 for whole numbers and for more digits than
-    can be meant.
+    """Return what one unit in the last digit of a printed number is worth. For whole numbers, and for numbers with more
+    digits than can be meant, return 0.
     """
     mantissa, _, exponent = number.lower().partition("e")
     decimals = mantissa.partition(".")[2]
@@ -175,7 +178,7 @@ def of_artifacts(old: Path, new: Path, name: str, looser: float = 1.0) -> Iterat
 
 
 def everything_in(file: Any) -> Iterator[tuple[str, Any]]:
-    """Return every group and dataset of a file by path, the root included."""
+    """Return every group and dataset of a file by path, including the root."""
     found = [("", file)]
     file.visititems(lambda path, item: found.append((path, item)))
     yield from found

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
 PAGE = ROOT / "docs" / "walkers.md"
 EXAMPLE = re.compile(r"```yaml\n(?:# .*\n)?((?:.*\n)*?name: (.*)\n(?:.*\n)*?)```")
-# The configs of the page that are drawn, by the names of their pictures.
+# Names of the pictures, and the config of the page that each one shows.
 PICTURES = {
     "compass": "my-compass",
     "straight-legs": "my-feet",
@@ -32,7 +32,7 @@ PICTURES = {
 
 
 def pictures() -> dict[str, bytes]:
-    """Draw the configs of docs/walkers.md, and the leg angles; return the pictures by file name."""
+    """Draw the configs of docs/walkers.md and the leg angles. Return the pictures by file name."""
     with tempfile.TemporaryDirectory() as folder:
         for config, name in EXAMPLE.findall(PAGE.read_text(encoding="utf-8")):
             (Path(folder) / f"{name}.yaml").write_text(config, encoding="utf-8")

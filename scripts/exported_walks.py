@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Integrate exported ADAMS models from their texts alone, and compare the touch times with those of our walk.
+"""Integrate ADAMS models from nothing but the exported text, and compare the touch times with those of our walk.
 
 Usage: python scripts/exported_walks.py [number of random walkers, 10 by default]
 """

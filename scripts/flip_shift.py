@@ -28,7 +28,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
 from walkerlab.scene.parameter import parameter_of
 
-SPAN = ValueSpan(3.9, 4.5)  # deg; contains every requested flip
+SPAN = ValueSpan(3.9, 4.5)  # deg; every flip that the script looks for lies inside
 
 
 class Ground(NamedTuple):
@@ -42,7 +42,7 @@ class Ground(NamedTuple):
 
 
 def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
-    """Return a built-in config on another ground. `more` are further settings, as on the command line."""
+    """Return a built-in config with other ground. `more` are further settings, as on the command line."""
     own = load(Path(of)).config.contact
     assert own is not None, "the config has a contact block"
     changed = {
@@ -59,7 +59,7 @@ def config_of(ground: Ground, *more: str, of: str = "paper") -> Config:
 
 
 def question(config: Config) -> FamilyQuestion:
-    """Ask for gaits of one step over the slope."""
+    """Build the request for one-step gaits over a range of slopes."""
     return FamilyQuestion(config, parameter_of("slope_deg", config), SPAN)
 
 
@@ -77,7 +77,7 @@ def flip_of(model: str, config: Config) -> float:
 
 
 def rows(name: str, grounds: Sequence[Ground], knob: Sequence[float], rigid: float) -> list[float]:
-    """Print a series while it is computed, and return its flips.
+    """Compute and print a series row by row, and return its flips.
 
     knob  the property that changes
     """

@@ -3,7 +3,8 @@
     python scripts/frame_rate.py runs/paper/report.html [--seconds 5]
 
 The script plays the walk with all of its views. It prints the number of frames drawn per second, the longest wait for a
-frame, and how long the page's script takes for one. `CHROMIUM` names a browser in another place.
+frame, and how long the page's script takes for one. The environment variable `CHROMIUM` gives the path of the browser
+if it is not found.
 """
 
 from __future__ import annotations

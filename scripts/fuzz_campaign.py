@@ -36,8 +36,8 @@ from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runs import RunFolder
 
-LONGEST_S = 20.0  # maximum time to refuse or simulate a config, once its models are compiled
-HANGS_S = 300.0  # after this time the campaign ends with a traceback of the place where it hangs
+LONGEST_S = 20.0  # maximum time in which a config must be refused or simulated once its models are compiled
+HANGS_S = 300.0  # After this time the campaign ends, with a traceback that shows where it hangs.
 WALKED, WALKED_ON_GROUND = 4, 8  # every 4th config is simulated, every 8th with the contact model
 TOLD_EVERY = 100
 WORDS = (
@@ -105,7 +105,7 @@ def fuzzed(drawn: random.Random, texts: list[bytes]) -> bytes:
 
 
 def configs() -> st.SearchStrategy[bytes]:
-    """Draw a few keys on top of a built-in config, with any value or one close to the present value."""
+    """Change a few keys of a built-in config to arbitrary values, or to values close to the present ones."""
     usual = dict(leaves_of(load(None).config.model_dump(mode="json"), ()))
     words = st.sampled_from([word.decode("latin-1") for word in WORDS])
     anything = st.one_of(st.floats(), st.integers(), st.booleans(), st.none(), words, st.text(), st.lists(st.floats()))
@@ -132,7 +132,7 @@ def leaves_of(block: dict[str, Any], above: tuple[str, ...]) -> Iterator[tuple[t
 
 
 def text_of(base: str, pairs: list[tuple[tuple[str, ...], Any]]) -> bytes:
-    """Write a config as YAML that is also JSON."""
+    """Write a config as JSON, which is valid YAML."""
     written: dict[str, Any] = {"extends": base}
     for (*blocks, name), value in pairs:
         inner = written
@@ -143,7 +143,7 @@ def text_of(base: str, pairs: list[tuple[tuple[str, ...], Any]]) -> bytes:
 
 
 def drawn_texts(count: int, seed: int) -> list[bytes]:
-    """Return this number of configs drawn by hypothesis."""
+    """Return `count` configs drawn by hypothesis."""
     found: list[bytes] = []
 
     @hypothesis.seed(seed)
@@ -167,7 +167,7 @@ def loaded(path: Path) -> LoadedConfig | None:
 
 
 def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Load `count` fuzzed configs and simulate some. Return their fates, and what went wrong."""
+    """Load `count` fuzzed configs and simulate some. Return how each ended, and what went wrong."""
     drawn = random.Random(seed)
     builtin = [path.read_bytes() for path in sorted(BUILTIN_FOLDER.glob("*.yaml"))]
     texts = drawn_texts(count // 2, seed)
@@ -181,7 +181,7 @@ def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
             try:
                 fate, took_s = timed(path, runs, number)
-                if took_s > LONGEST_S:  # It may have compiled a method, so try again.
+                if took_s > LONGEST_S:  # The first try may have compiled a method, so time a second one.
                     fate, took_s = timed(path, runs, number)
                 fates[fate] += 1
                 if took_s > LONGEST_S:
@@ -198,13 +198,13 @@ def fuzz_configs(count: int, seed: int) -> tuple[Counter[str], list[str]]:
 
 
 def timed(path: Path, runs: Path, number: int) -> tuple[str, float]:
-    """Return the fate of a config, and the processor time (s) that it took."""
+    """Return how a config ended, and the processor time it took (s)."""
     began = time.process_time()
     return fate_of(path, runs, number), time.process_time() - began
 
 
 def fate_of(path: Path, runs: Path, number: int) -> str:
-    """Load a config, and for some simulate at most a few strides. Return what happened."""
+    """Load a config, and simulate a few strides of every fourth one. Return how it ended."""
     found = loaded(path)
     if found is None:
         return "refused with its position"
@@ -220,7 +220,7 @@ def fate_of(path: Path, runs: Path, number: int) -> str:
 
 
 def damage_results(count: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Damage a stored result `count` times. Return the verdicts, and what went wrong."""
+    """Damage a stored result `count` times. Return how often results were accepted, and what went wrong."""
     drawn = random.Random(seed)
     fates: Counter[str] = Counter()
     wrong: list[str] = []
@@ -261,7 +261,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     began = time.perf_counter()
-    # This comes first, because it compiles the model, which would otherwise count as a hang.
+    # Damaged results come first: they compile the model, which would otherwise look like a hang.
     damaged, wrong_too = damage_results(asked.damaged, asked.seed)
     configs, wrong = fuzz_configs(asked.configs, asked.seed)
     print("| what | fate | times |\n|---|---|---|")

@@ -1,4 +1,6 @@
-"""Add to a package what only its build knows: the commit, and the machine code of its kernels (see pyproject.toml)."""
+"""Add the commit and the machine code of the kernels to a package, since both are known only when it is built (see
+pyproject.toml).
+"""
 
 from __future__ import annotations
 
@@ -13,20 +15,23 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 MACHINE_CODE = "walkerlab/physics/machine_code"
-# The oldest systems on which the wheel works: the machine code calls only functions that every C library has.
+# The oldest systems on which the wheel works. They suffice, because the machine code calls only functions that every C
+# library has.
 OLDEST_SYSTEMS = ("manylinux_2_17_", "macosx_11_0_")
 
 
 class PackageHook(BuildHookInterface[Any]):
-    """Adds the commit to a wheel's metadata or to the root of a source distribution, and machine code to a wheel."""
+    """Build hook that adds the commit to the metadata of a wheel or to the root of a source distribution, and machine
+    code to a wheel.
+    """
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add both, except to an editable installation, which reads the commit from its checkout and compiles when it
-        runs.
+        """Add both. An editable installation needs neither, because it reads the commit from its checkout and compiles
+        when it runs.
         """
         if version == "editable":
             return
-        self.folder = tempfile.TemporaryDirectory()  # deleted after the build
+        self.folder = tempfile.TemporaryDirectory()  # The folder is deleted after the build.
         self.add_commit(build_data)
         if self.target_name == "wheel" and os.environ.get("WALKERLAB_BUILD_KERNELS") != "0":
             self.add_machine_code(build_data)

@@ -5,12 +5,12 @@
     python scripts/kill_campaign.py --stage report --config paper --together 2 8   # 2, then 8 runs at once on a folder
     python scripts/kill_campaign.py --sweeps --kills 50                  # a sweep of fixed points, or a worker of it
 
-Half of the moments are at random, and half are when a file of the folder has just begun to change. With --spread the
-moments are spread over all results: each time another result is missing from a complete folder, and the run is killed
-while it computes this result, so that a kill takes no longer than its result. With --sweeps either the sweeping process
-or one of its workers is killed within a second after a chunk was stored. The same command then continues, and at the
-end two such sweeps run on one folder at once. The script prints a table in Markdown, and exits with 1 if anything was
-lost.
+Half of the kills come at a random moment, the others when a file of the folder has just begun to change. With --spread
+the moments are spread over all results: each time another result is missing from a complete folder, and the run is
+killed while it computes this result, so that a kill takes no longer than its result. With --sweeps either the sweeping
+process or one of its workers is killed within a second after a chunk was stored. The same command then continues, and
+at the end two such sweeps run on one folder at once. The script prints a table in Markdown, and exits with 1 if
+anything was lost.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from process_table import processes_below
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 LONGEST_S = 600.0
 LOCK = ".lock"
-LATEST = 0.85  # fraction of the usual time, because a run that has ended cannot be killed
+LATEST = 0.85  # Kill before this fraction of the usual time, because a run that has ended cannot be killed.
 
 
 def command(stage: str, config: str, runs: Path, *options: str) -> list[str]:
@@ -69,7 +69,7 @@ def finish(arguments: Sequence[str]) -> tuple[int, str, float]:
 
 
 def state_of(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return sizes and times of all files but the lock, to notice when one begins to change."""
+    """Return sizes and times of all files but the lock. They show when a file begins to change."""
     found = {}
     for path in folder.rglob("*"):
         if path.name == LOCK:
@@ -83,7 +83,9 @@ def state_of(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def kill_at(process: subprocess.Popen[str], runs: Path, delay_s: float, at_write: bool) -> str:
-    """Kill the process group after a time, or as soon as a file changes after that. Return when it was."""
+    """Kill the process group after `delay_s`, or, with `at_write`, when a file next changes after that. Return a
+    description of the moment.
+    """
     time.sleep(delay_s)
     before = state_of(runs)
     while at_write and process.poll() is None and state_of(runs) == before:
@@ -98,12 +100,12 @@ def kill_at(process: subprocess.Popen[str], runs: Path, delay_s: float, at_write
 
 
 def digests(runs: Path) -> dict[str, str]:
-    """Return the digest of every stored result by path. A broken result raises the error of `read`."""
+    """Return the digest of every stored result by path. Raises the error of `read` for a broken result."""
     return {str(path.relative_to(runs)): artifact.read(path).digest() for path in sorted(runs.rglob("*.h5"))}
 
 
 def unreadable(runs: Path) -> list[str]:
-    """List the results that exist under their own names and are broken."""
+    """List the results that have their final name and are broken."""
     broken = []
     for path in sorted(runs.rglob("*.h5")):
         if path.name.startswith("."):
@@ -119,7 +121,7 @@ class Campaign:
     """Kills of one kind of run, one after another, and their consequences."""
 
     def __init__(self, stage: str, config: str, seed: int, place: Path) -> None:
-        """Prepare the folders of the undisturbed run and of the disturbed ones in `place`. Nothing is killed yet."""
+        """Prepare a folder for the undisturbed run and one for the disturbed runs, both in `place`."""
         self.stage, self.config, self.drawn = stage, config, random.Random(seed)
         self.undisturbed, self.runs = place / "undisturbed", place / "runs"
         self.moments: Counter[str] = Counter()
@@ -127,7 +129,7 @@ class Campaign:
         self.code, self.expected = 0, {}
 
     def undisturbed_run(self, *options: str) -> float:
-        """Compute the reference for the disturbed runs, and return its time (s)."""
+        """Compute the results without a disturbance, for comparison, and return the time it took (s)."""
         self.code, said, took_s = finish(command(self.stage, self.config, self.undisturbed, *options))
         if self.code not in (0, 4):
             raise SystemExit(f"the undisturbed run exits {self.code}: {said}")
@@ -135,7 +137,7 @@ class Campaign:
         return took_s
 
     def kill(self, most_s: float, about: str, *options: str) -> None:
-        """Kill a run within `most_s` seconds, check what is there, and run again."""
+        """Kill a run within `most_s` seconds, check the results that it left, and let the next run complete."""
         at_write, delay_s = self.drawn.random() < 0.5, self.drawn.uniform(0.0, LATEST * most_s)
         process = start(command(self.stage, self.config, self.runs, *options))
         moment = kill_at(process, self.runs, delay_s, at_write)
@@ -154,7 +156,7 @@ class Campaign:
 
 
 def campaign(stage: str, config: str, kills: int, seed: int) -> tuple[Counter[str], list[str]]:
-    """Kill forced runs. Return the moments of the kills, and everything that was lost."""
+    """Kill forced runs. Return when each was killed, and everything that was lost."""
     with tempfile.TemporaryDirectory() as place:
         one = Campaign(stage, config, seed, Path(place))
         one.undisturbed_run()
@@ -242,7 +244,7 @@ def sweeps(kills: int, seed: int) -> tuple[Counter[str], list[str]]:
                 if what == "parent":
                     break
             process.communicate()
-            if process.returncode == 0:  # it ended before all kills, so start over
+            if process.returncode == 0:  # The sweep ended before all kills, so start over.
                 judge(runs, f"after {killed.total()} kills")
                 shutil.rmtree(runs)
         finish(command("sweep", "paper", runs, *SWEEP))

@@ -1,4 +1,4 @@
-"""Measure how a compliant knee stop approaches the ideal lock as it stiffens, and of what order the difference is.
+"""Measure how a compliant knee stop approaches the ideal lock as it stiffens, and the order of convergence.
 
     python scripts/knee_stop.py             # the built-in kneed walker
     python scripts/knee_stop.py my.yaml --steps 40
@@ -23,7 +23,7 @@ from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 
 STIFFNESSES = (1e3, 1e4, 1e5, 1e6, 1e7)  # N m/rad
-DAMPING, AT = 90.0, 1e5  # N m s/rad at a stiffness: the config's defaults
+DAMPING, AT = 90.0, 1e5  # damping (N m s/rad) at a stiffness (N m/rad): the config's defaults
 RTOL, ATOL, BUDGET = 1e-10, 1e-12, 20_000_000
 HEAD = ("stop (N m/rad)", "period (s)", "knee locks after (s)", "period off (s)", "order", "lock off (s)", "order")
 

@@ -1,4 +1,4 @@
-"""Measure what omissions save: each reduced scene against the full one, in time, compile time and bytes.
+"""Measure how much time, compile time and storage is saved by what a config omits.
 
 Times are processor times. `benchmark.py` prints the table and writes it into docs/performance.md.
 """
@@ -28,13 +28,13 @@ from walkerlab.pipeline.store.provenance import Provenance, begin
 from walkerlab.scene.contact import contact_scene, start_state
 
 ROOT = Path(__file__).resolve().parent.parent
-# Start and pads are given, so that only the stage itself runs.
+# The start state and the pads are given, so that no other stage has to run.
 GAIT = (-0.2042, 0.1694, -0.6, -0.86)
 GIVEN = (f"start={list(GAIT)}", "contact.pad_pitch=0.3714")
 BUDGET = 10_000_000  # right-hand sides
 IDENTITY = Identity("measured", {}, {}, "")
 NO_FRICTION = ("contact.static_friction=0", "contact.dynamic_friction=0")
-ALIKE = 0.05  # times that differ by less than this fraction count as equal
+ALIKE = 0.05  # Times that differ by less than this fraction count as equal.
 HEAD = ("left out", "against", "right-hand side, ns", "run, ms", "import, s", "compile, s", "file, kB", "conclusion")
 QUANTITIES = ("a right-hand side", "a run", "importing", "compiling", "the file")
 
@@ -70,7 +70,9 @@ class Scene:
 
 
 def with_books(kept: bool) -> None:
-    """Simulate the paper's walk, with or without the energy balance (losses to damping, friction and edges)."""
+    """Simulate the paper's walk. If `kept` is true, also keep the energy balance: losses to damping, friction and
+    edges.
+    """
     scene = contact_scene(contact().config, 0.3714)
     settings = contact().config.solver.contact
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, BUDGET)
@@ -116,7 +118,7 @@ def outputs(*names: str) -> str:
 
 
 def reductions() -> list[Reduction]:
-    """Return all omissions, and one candidate that saves nothing."""
+    """Return all omissions, and one that was tried and saves nothing."""
     whole, none = contact(), contact(outputs())
     import_stage = "import walkerlab.{}, walkerlab.pipeline.run.runner"
     walking, drawing = import_stage.format("pipeline.stages.simulate"), import_stage.format("views.figures.stage")
@@ -174,7 +176,7 @@ def reductions() -> list[Reduction]:
 
 
 def leaving_out_rows(sides: dict[str, float], repeats: int) -> list[list[str]]:
-    """Return the rows of the table, given the times of all right-hand sides."""
+    """Return the rows of the table. `sides` has the times of all right-hand sides."""
     with tempfile.TemporaryDirectory() as place:
         found = [measured(one, sides, repeats, Path(place)) for one in reductions()]
     return [row_of(one) for one in found]
@@ -227,7 +229,7 @@ def run(command: Sequence[str], cache: Path | None = None) -> None:
 
 
 def compile_s(scene: Scene, place: Path) -> float:
-    """Return the processor time (s) of a first run minus that of a second one."""
+    """Return the processor time of compiling (s): that of a first run minus that of a second one."""
     with tempfile.TemporaryDirectory(dir=place) as cache:
         work = partial(run, scene.command(place), Path(cache))
         start = processor_s()

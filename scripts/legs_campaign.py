@@ -1,14 +1,14 @@
-"""Compare gaits of random walkers whose legs differ with a plain integration of both swings, written for the tests.
+"""Compare gaits of random walkers with different legs with the plain integration in the tests.
 
     python scripts/legs_campaign.py              # 100 walkers
     python scripts/legs_campaign.py 12 --seed 7
 
-The walkers have straight legs, round feet, knees, knees and round feet, or one knee; every third one that is not
-one-kneed pushes off, with another impulse of each leg. Of each, a gait is searched for, and a stride from its state is
-integrated by SciPy (tests/plain_unequal_walk.py), where strikes follow from balances of angular momentum. Durations and
-lengths of both steps and the state after them may differ by 1e-10 (of leg length and pendulum time). The stride's
-multipliers are those of central differences of plain strides, to 1e-5. Prints a table in Markdown; exits 1 if a gait
-differs.
+The walkers have straight legs, round feet, knees, knees and round feet, or one knee; every third one, unless it has one
+knee, pushes off with a different impulse of each leg. The script looks for a gait of each and integrates a stride from
+its state with SciPy (tests/plain_unequal_walk.py), where heel strikes follow from balances of angular momentum.
+Durations and lengths of both steps and the state after them may differ by 1e-10 (of leg length and pendulum time).
+Multipliers may differ by 1e-5 from those of central differences of plain strides. Prints a table in Markdown; exits 1
+if a gait differs.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ SAMPLES_A_SECOND = 50.0
 
 
 def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
-    """Return what the page shows of one point of the sweep: a sentence, and one stride from its state."""
+    """Return what the page shows for one point of the sweep: a sentence about the gait, and one stride of it."""
     if str(point.status.item()) != "answered":
         return {"text": str(point.reason.item())}
     stable = "stable" if float(point.spectral_radius) < 1.0 else "unstable"
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="where the pages go")
     parser.add_argument("--runs", type=Path, default=Path("runs"))
-    parser.add_argument("--only", choices=("sweep", *WALKERS), help="one of them")
+    parser.add_argument("--only", choices=("sweep", *WALKERS), help="write only this page")
     options = parser.parse_args(arguments)
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in (each for each in WALKERS if options.only in (None, each)):

@@ -25,7 +25,7 @@ START, NOISES_RAD, EXPERIMENTS = 0.03, (0.0, 0.002, 0.005, 0.01, 0.02), 200
 
 
 def pairs_of(walks, p, z, trials, draw):
-    """Return the states (trials, d) at two successive heel strikes, of trials that walk."""
+    """Return the states (trials, d) at two successive heel strikes. Trials that fall are skipped."""
     pairs = []
     while len(pairs) < trials:
         start = z + START * draw.normal(size=z.size)
@@ -56,7 +56,8 @@ def main(name, trials):
             before, after = pairs + noise * draw.normal(size=pairs.shape)
             found.append((multipliers(before, after), multipliers(before, after, noise)))
         for method, each in zip(("least squares", "errors-in-variables"), np.swapaxes(found, 0, 1), strict=True):
-            # a median, because a covariance from which noise is subtracted may be nearly singular
+            # Take the median: a covariance from which noise is subtracted may be nearly singular, which gives wild
+            # values.
             low, middle, high = np.percentile(each, (16, 50, 84), axis=0)
             values = "  ".join(f"{m:.2f} ± {h:.2f}" for m, h in zip(middle, (high - low) / 2, strict=True))
             print(f"  noise {noise:.3f} rad, {method:20s} {values}")

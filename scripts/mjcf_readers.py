@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the table of docs/engines.md: how programs read an exported model, and how it walks in them.
+"""Make the table of docs/engines.md on how other programs read an exported model and how it walks in them.
 
 Usage: python scripts/mjcf_readers.py MODEL.xml [STEP_S]
 
@@ -21,7 +21,9 @@ STEPS, UNTIL_S = 10, 9.0
 
 
 class Feet:
-    """Touches of a walk, found from the coordinates alone: a ball comes down on the ground ahead of the other one."""
+    """Touches of a walk, found from the coordinates alone. A touch is when one ball comes down on the ground ahead of
+    the other.
+    """
 
     def __init__(self, path):
         self.model = mujoco.MjModel.from_xml_path(path)
@@ -36,7 +38,7 @@ class Feet:
         self.stance, self.touches = 1, []
 
     def follow(self, time_s, q):
-        """Note a touch, and return whether the walk goes on."""
+        """Record a touch if there is one, and return whether the walk goes on."""
         self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         feet = self.data.geom_xpos[self.feet]

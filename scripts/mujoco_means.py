@@ -29,7 +29,7 @@ BELT_M_S = -0.5
 
 
 def without_pairs(text):
-    """Define the contacts by the feet alone, whose damper then also acts in friction."""
+    """Define contacts by the feet instead of contact pairs. The damper of the feet then also acts in friction."""
     return re.sub(r"<contact>.*?</contact>", "", text, flags=re.DOTALL)
 
 
@@ -42,7 +42,7 @@ def with_flag(text):
 
 
 def on_treadmill(text):
-    """Let the ground move backwards, and at the start the walker with it."""
+    """Let the ground move backwards. The walker moves with it at the start."""
     text = re.sub(r'(<geom name="pad_[^>]*?) ?/>', rf'\1 surfacevel="{BELT_M_S} 0 0 0 0 0"/>', text)
     return re.sub(r'qvel="(\S+)', lambda match: f'qvel="{float(match[1]) + BELT_M_S!r}', text)
 
@@ -58,7 +58,9 @@ MEANS = {
 
 
 def exported(name, *settings):
-    """Return the text of the model, our walk, the depth of the law at rest, and whether the ground consists of pads."""
+    """Return the text of the model, our walk, the penetration at rest by our force law, and whether the ground consists
+    of pads.
+    """
     config = load(Path(name), settings).config
     gait = run_in_memory("fixedpoint", config).summary
     start = GaitStart(gait["step_length_m"], gait["state"], gait["asymmetry"]["step_length"])
@@ -86,7 +88,7 @@ def take_steps(walk, steps):
 
 
 def depth_at_rest(model, depth, relative):
-    """Return the depth of the stance foot under the weight, over `depth`. Joints hold what the ground does not.
+    """Return the penetration of the stance foot under the weight, over `depth`. The joints hold the pose.
 
     relative  factor on the angle between the legs in the pose of the gait
     """
@@ -124,7 +126,7 @@ def main(names):
         text, steps, depth, steps_on_pads = exported(name)
         for means, change in MEANS.items():
             if change is on_treadmill and steps_on_pads:
-                continue  # pads do not move with their surface
+                continue  # Pads would have to move with their surface.
             changed = change(text)
             mujoco.set_mjcb_control(None)
             model = mujoco.MjModel.from_xml_string(changed)

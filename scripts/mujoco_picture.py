@@ -36,7 +36,7 @@ def main(file: Path) -> None:
         camera.lookat[:] = data.subtree_com[1] - (0.0, 0.0, 0.2)
         renderer.update_scene(data, camera)
         picture = renderer.render().copy()
-        picture[(picture == 0).all(axis=2)] = 255  # the empty background
+        picture[(picture == 0).all(axis=2)] = 255  # The renderer leaves the background black.
         pictures.append(picture)
     matplotlib.image.imsave(file, np.concatenate(pictures, axis=1))
 

@@ -26,11 +26,11 @@ from walkerlab.pipeline.stages.walk import change
 
 ERRORS = (*ERROR_OF_EACH_STEP.values(), "end_time_s")
 FACTORS = (1.5, 10.0)
-LEAST = 1e-11  # s or m; smaller errors are rounding, or the last digits of the time of an event
+LEAST = 1e-11  # s or m; smaller errors are rounding, or the last digits of an event's time
 
 
 def walked(drawn: Drawn, steps: int) -> tuple[list[dict[str, Any]], list[int]]:
-    """Return summaries of the walk from the default to the tightest tolerance, and their counts of right-hand sides."""
+    """Return summaries and counts of right-hand sides of the walk at each tolerance, beginning with the default."""
     config, scene = scene_of(drawn)
     walks = [ours_at(scene, config, drawn, steps, tighter) for tighter in TIGHTER]
     return [walk_summary(walk) for walk in walks], [int(walk.work[0]) for walk in walks]

@@ -1,8 +1,8 @@
-"""Pictures of the docs: how each is drawn, and what shows that it is out of date.
+"""How each picture of the docs is drawn, and how to notice that it is out of date.
 
-The words of each figure stand next to it in docs/images/NAME.words. They come from the same drawing code on small
-results, which take seconds, so that a check need not compute the results of the picture itself. A screenshot has a
-digest of the files that it shows instead.
+The words of each figure are stored next to it in docs/images/NAME.words. They come from the same drawing code on small
+results, which take seconds, so that a check need not compute the results of the picture itself. For a screenshot, a
+digest of the files that it shows is stored instead.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ PAGE = ROOT / "walkerlab" / "views"
 class FigurePicture:
     """A figure of a stage's result."""
 
-    figure: str  # its name in `FIGURES`
+    figure: str  # name in `FIGURES`
     stage: str
     config: str = "paper"
     settings: Mapping[str, Any] = field(default_factory=dict)  # changes of the config
     small: Mapping[str, Any] = field(default_factory=dict)  # further changes for results that take seconds
-    others: tuple[str, ...] = ()  # stages whose results are drawn, too
+    others: tuple[str, ...] = ()  # further stages whose results the figure shows
 
     def draw(self, runs: Path, settings: Mapping[str, Any]) -> Drawing:
         stages = (self.stage, *self.others)
@@ -63,7 +63,7 @@ class FigurePicture:
         path.write_bytes(self.draw(runs, self.settings).png)
 
     def words(self, runs: Path) -> str:
-        """Words of the figure when it is drawn today from small results, one text a line."""
+        """Return the words of the figure as today's code draws it from small results, one text a line."""
         return words_of(self.draw(runs, {**self.settings, **self.small}).svg.decode())
 
 
@@ -77,8 +77,8 @@ class SweepPicture:
     config: str = "paper"
     settings: Mapping[str, Any] = field(default_factory=dict)  # changes of the config
     small: Mapping[str, Any] = field(default_factory=dict)  # further changes for a sweep that takes seconds
-    zip: bool = False  # whether the n-th values form the n-th point, instead of all combinations
-    show: tuple[str, ...] = ()  # quantities; default: those that the stage's sweeps show
+    zip: bool = False  # whether the n-th values form the n-th point; otherwise all combinations are points
+    show: tuple[str, ...] = ()  # quantities; the default are those that sweeps of the stage show
 
     def draw(self, runs: Path, over: Mapping[str, Any], settings: Mapping[str, Any]) -> Drawing:
         folder = runs / hashlib.sha256(repr((self.stage, over)).encode()).hexdigest()[:8]
@@ -93,7 +93,7 @@ class SweepPicture:
         path.write_bytes(self.draw(runs, self.over, self.settings).png)
 
     def words(self, runs: Path) -> str:
-        """Words of the figure when it is drawn today from a small sweep."""
+        """Return the words of the figure as today's code draws it from a small sweep."""
         return words_of(self.draw(runs, self.few, {**self.settings, **self.small}).svg.decode())
 
 
@@ -116,16 +116,16 @@ class Film:
         path.write_bytes(gif(self.frames(runs), self.rate))
 
     def words(self, runs: Path) -> str:
-        """Words of the first frame."""
+        """Return the words of the first frame."""
         frames = self.frames(runs)
         next(frames)
-        # A frame is an array of pixels; its figure, with the words, stays in the generator.
+        # A frame is an array of pixels. The figure, which has the words, is a local of the generator.
         return words_of(as_file(inspect.getgeneratorlocals(frames)["figure"], "svg", "film", "").decode())
 
 
 @dataclass(frozen=True)
 class ExamplePicture:
-    """The picture that the last Python example of a page saves, drawn from a walk of the page's first config."""
+    """The picture that the last Python example of a page saves, for a walk of the first config on the page."""
 
     page: str
 
@@ -146,7 +146,7 @@ class ExamplePicture:
         (runs / path.name).replace(path)
 
     def words(self, runs: Path) -> str:
-        """Words of the figure when the example runs today."""
+        """Return the words of the figure as the example draws it today."""
         file = io.BytesIO()
         with matplotlib.rc_context({"svg.fonttype": "none"}):
             self.figure(runs).savefig(file, format="svg")
@@ -157,7 +157,7 @@ class ExamplePicture:
 class Screenshot:
     """A picture that a script takes."""
 
-    script: str  # in scripts/; its `main` writes the picture
+    script: str  # file in scripts/ whose `main` writes the picture
     shows: tuple[Path, ...]  # files that decide what the picture shows
 
     def write(self, path: Path, runs: Path) -> None:  # noqa: ARG002
@@ -167,16 +167,16 @@ class Screenshot:
         return b"".join(file.read_bytes() for file in sorted(self.shows))
 
     def words(self, runs: Path) -> str:
-        """Digest of what the picture shows."""
+        """Return the digest of the files that the picture shows."""
         return f"sha256 of what it shows: {hashlib.sha256(self.content(runs)).hexdigest()}\n"
 
 
 @dataclass(frozen=True)
 class ModelPicture(Screenshot):
-    """A picture of the walker of the paper in MuJoCo."""
+    """Picture of the paper's walker in MuJoCo."""
 
     def content(self, runs: Path) -> bytes:
-        """The model of the walker without its numbers and comments, and the script."""
+        """Return the model of the walker without numbers and comments, and the script."""
         path, *_ = api.export_model(runs / "picture.xml", name="paper", strides=2)
         model = re.sub(r"<!--.*?-->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
         return super().content(runs) + NUMBER.sub("#", model).encode()
@@ -313,11 +313,13 @@ PICTURES: dict[str, FigurePicture | SweepPicture | Film | ExamplePicture | Scree
         tuple(PAGE / "report" / "templates" / name for name in ("page.html.j2", "style.css", "blocks/player.html.j2")),
     ),
 }
-"""How pictures in docs/images are drawn; pictures of longer computations have the command in their caption."""
+"""How the pictures in docs/images are drawn. A picture of a longer computation is not listed here, but has its command
+in the caption.
+"""
 
 
 def words_of(svg: str) -> str:
-    """Texts of an SVG that hold letters, sorted, with # for each number.
+    """Return the texts of an SVG that contain letters, sorted, with # for each number.
 
     >>> words_of("<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>")
     'slope (rad)\\nstep #\\n'
@@ -327,12 +329,12 @@ def words_of(svg: str) -> str:
 
 
 def words_file(name: str) -> Path:
-    """File with the words of a picture."""
+    """Return the path of the file with the words of a picture."""
     return (IMAGES / name).with_suffix(".words")
 
 
 def write_pictures(runs: Path, names: Iterable[str] = PICTURES) -> None:
-    """Draw pictures and write their words; the results take minutes, unless they are in the folder of runs."""
+    """Draw pictures and write their words. Computing the results takes minutes, unless the folder of runs has them."""
     for name in names:
         PICTURES[name].write(IMAGES / name, runs)
         words_file(name).write_text(PICTURES[name].words(runs), encoding="utf-8")

@@ -140,7 +140,9 @@ def comment_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """A printed gait: name, source, finding, count of reproduced values, difference of both routes, and texts."""
+    """A printed gait as the pages show it: what was found, how many values are reproduced, and how far both routes
+    differ.
+    """
 
     name: str
     source: str
@@ -181,14 +183,14 @@ def entry_of(file: Path) -> Entry:
 
 
 def short_source(source: Mapping) -> str:
-    """Return author, title and year of a source, as far as they are known."""
+    """Return author, title and year of a source, leaving out what is not known."""
     title = f"*{source['title']}*"
     dated = f"{title} ({source['year']})" if source["year"] else title
     return f"{source['authors']}, {dated}" if source["authors"] else dated
 
 
 def difference_of_routes(summary: Mapping) -> float:
-    """Return the difference of both models. Exits with a message if they do not agree."""
+    """Return the difference between the gaits of both routes. Exit with a message if they do not agree."""
     routes = summary["routes"]
     if routes is None or not routes["agree"]:
         sys.exit(f"the two routes do not agree on {summary['source']['title']}: {routes}")
@@ -201,7 +203,7 @@ def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def finding_of(summary: Mapping) -> str:
-    """Return the finding. It is 'partly explained' if a cause gives some of the values that differ."""
+    """Return the finding, which is 'partly explained' if a cause reproduces some of the values that differ."""
     unexplained = summary["finding"] not in ("explained", "reproduced")
     return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
 
@@ -234,7 +236,7 @@ def sections(entries: Sequence[Entry]) -> list[str]:
     """Return a section for each printed gait."""
     texts = []
     for each in entries:
-        # The page begins with the table of this gait.
+        # The table of this gait already stands at the top of the page.
         above = each.table if each.name == STORY else None
         paragraphs = [text for text in each.paragraphs if text and text != above]
         texts.append("\n\n".join([f"## {each.name}", *paragraphs]) + "\n")

@@ -1,17 +1,17 @@
-"""Keep README and docs true: write the parts that follow from the code, and try the examples.
+"""Keep README and docs up to date: write the parts that are generated from the code, and try the examples.
 
     python scripts/refresh_docs.py [--check | --pictures | --downloads]
     python scripts/refresh_docs.py --examples [--slow] [DOCUMENT ...]
 
-A part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing is
-written, and the exit code is 1 if a part or a picture is out of date. --pictures draws the pictures of docs/images, see
-pictures.py, and --downloads writes the models in docs/downloads; their bytes depend on versions and platform, so they
-are not compared.
+A generated part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check
+nothing is written, and the exit code is 1 if a part or a picture is out of date. --pictures draws the pictures of
+docs/images, see pictures.py, and --downloads writes the models in docs/downloads; their bytes depend on versions and
+platform, so they are not compared.
 
 An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
 `>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
-anything. Examples of a document run in order in one folder, which holds the downloads that the document links; those
-below `<!-- takes minutes -->` run with --slow only.
+anything. Examples of a document run in order in one folder, which contains the downloads that the document links. Those
+below `<!-- takes minutes -->` run only with --slow.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ DOWNLOAD = re.compile(r"\]\((downloads/[^)]+)\)")
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 TERMINAL = {"COLUMNS": "100"}
 Run = Callable[[str, int], tuple[str, int]]
-"""Runs a command, given the exit code of the one before. Returns its output and its own exit code."""
+"""Runs a command and returns its output and exit code. The second argument is the exit code of the previous command."""
 PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
 class Results:
-    """Summaries of stages, computed in a folder on first use."""
+    """Summaries of stages, each computed in a folder of runs when it is first used."""
 
     def __init__(self, runs: Path) -> None:
-        """Use this folder of runs, and reuse its results."""
+        """Compute in this folder of runs, and reuse the results in it."""
         self.runs = runs
         self.summary = cache(self._summary)
 
@@ -140,7 +140,7 @@ def gait_row(name: str, gait: dict[str, Any]) -> list[str]:
 
 
 def multipliers(pairs: Sequence[Sequence[float]]) -> str:
-    """Format multipliers, complex pairs as one entry."""
+    """Format multipliers, with a complex pair as one entry."""
     real = [number(re_, 4) for re_, im in pairs if im == 0.0]
     double = [f"{number(re_, 4)} ± {number(im, 4)} i" for re_, im in pairs if im > 0.0]
     return ", ".join([*double, *real])
@@ -173,7 +173,7 @@ def paper_and_ours(results: Results) -> str:
 
 
 def study_in_five_rows(results: Results) -> str:
-    """Tabulate start, step period, step length, stability and energy of the paper and of both models."""
+    """Tabulate how start, step period, step length, stability and energy of the paper compare with both models."""
     compared = results.summary("compare")
     single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
     cells = [
@@ -195,7 +195,7 @@ def printed_once(title: str, entry: dict[str, Any]) -> list[str]:
 
 
 def beside(title: str, row: dict[str, Any], printed_digits: int) -> list[str]:
-    """Format a row of the paper's tables: its columns with the printed digits, ours with four digits."""
+    """Format a row of the paper's tables, with the printed digits in the paper's columns and four digits in ours."""
     cells = [number(row[name], printed_digits if name.startswith("paper") else 4) for name in COLUMNS]
     return [title, *cells]
 
@@ -225,10 +225,7 @@ PARTS: dict[str, Callable[[Results], str]] = {
 
 
 def refreshed(text: str, results: Results) -> str:
-    """Return a document with its generated parts made anew.
-
-    Raises KeyError for a part that has no generator.
-    """
+    """Return a document with its generated parts brought up to date. Raises KeyError for a part without a generator."""
     return PART.sub(lambda found: found[1] + PARTS[found[2]](results) + found[4], text)
 
 
@@ -263,7 +260,7 @@ def write_downloads() -> None:
     """Write the paper's walker for ADAMS and MuJoCo."""
     for ending in ("adm", "cmd", "xml"):
         for path in export_model(ROOT / "docs" / "downloads" / f"paper.{ending}", name="paper", slope_rad=0.0174):
-            # The commit that will hold the file is not known yet.
+            # The file is part of the next commit, whose digest is not known yet.
             text = re.sub(r", commit \w+(-dirty)?", "", path.read_text(encoding="utf-8"))
             path.write_text(text, encoding="utf-8")
 

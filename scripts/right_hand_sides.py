@@ -20,8 +20,8 @@ from walkerlab.scene.contact import contact_scene
 from walkerlab.scene.rigid import rigid_walker
 
 ONE_DEGREE = loader.load(None, ("slope_deg=1",)).config
-CALLS, STATES = 200_000, 64  # calls of a right-hand side, and the states that they are at
-FREE = (0.0, 0.7365, -0.2044, 0.1695, 0.65, -0.1, -0.6, -0.86)  # both feet a hair inside the ground
+CALLS, STATES = 200_000, 64  # number of calls of a right-hand side, and number of different states for them
+FREE = (0.0, 0.7365, -0.2044, 0.1695, 0.65, -0.1, -0.6, -0.86)  # state with both feet slightly inside the ground
 ANGLES = (-0.2044, 0.1695, -0.6, -0.86)
 
 
@@ -30,7 +30,7 @@ for formula in (swing_constants, accelerations):
 
 
 class AppendixA(NamedTuple):
-    """The equations of the compass, written out for one walker only."""
+    """The equations of the compass as the paper writes them out, for this walker only."""
 
     walker: RigidWalker
 
@@ -81,7 +81,7 @@ def times_ns(repeats: int) -> dict[str, float]:
     """Return the processor time (ns) of each right-hand side, as medians of repeats that take turns."""
     jobs: dict[str, tuple[Any, Any, Any]] = {}
     for name, (system, state) in systems().items():
-        # as many different states as fit into the fastest memory, a hair apart
+        # Slightly different states, as many as fit into the fastest memory.
         states = np.array(state) * (1.0 + 1e-6 * np.arange(STATES)[:, np.newaxis])
         jobs[name] = (system, states, np.zeros_like(states))
         call_often(*jobs[name], STATES)

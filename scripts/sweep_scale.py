@@ -1,4 +1,4 @@
-"""Measure the cost of a sweep itself: memory and time of the sweeping process for points that take no time.
+"""Measure the overhead of a sweep: memory and time of the sweeping process for points that take no time.
 
     python scripts/sweep_scale.py [--points 10000 100000] [--limit-mb 500]
 

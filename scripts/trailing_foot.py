@@ -4,9 +4,9 @@
     python scripts/trailing_foot.py --config kneed
 
 The walker walks from its rigid gait to its first touch, at which its knees, if any, are locked. From there SciPy's
-Radau integrates the same equations, with the impulses on both feet, until the leading foot stops sinking in. For
-comparison, an impact that acts on the leading foot alone starts from the same state and releases the trailing foot, as
-in the rigid model. Stiffness, damping and friction change as in flip_shift.py.
+Radau integrates the same equations and the impulses on both feet, until the leading foot stops sinking in. For
+comparison, the script applies the rigid model's impact to the same state. It acts on the leading foot alone and
+releases the trailing foot. Stiffness, damping and friction change as in flip_shift.py.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ GROUNDS = (
     Ground(12.5, 1e-4, 100.0, 10.0, 2.0),
 )
 LEADING, TRAILING = 0, 1  # feet at the first touch
-LONGEST = 0.02  # s, maximum time for which a foot sinks in
+LONGEST = 0.02  # s, longest time that a foot may take to sink in
 HEAD = ("stiffness", "damping", "friction", "slips (m/s)", "rises (m/s)", "alone: slips", "rises", "share of impulse")
 
 
@@ -62,7 +62,7 @@ class Struck(NamedTuple):
 
 
 def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Floats]:
-    """Return a config's walker on its ground, with each straight leg as one body, and its state at the first touch."""
+    """Return a config's walker on the ground, with each straight leg as one body, and the state at the first touch."""
     config = config_of(ground, f"slope_deg={slope_deg!r}", "contact.terrain=after-mid-swing", of=name)
     rigid = rigid_walker(config, config.equations)
     gait = find_gaits(rigid, config.seed).gait
@@ -83,7 +83,7 @@ def freed(system: OnGround, y: Floats) -> FootMotion:
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[4 + n :], M, unused)
     masses[2:, 2:] = M
-    # maps velocities to the slip and sinking of the leading foot
+    # maps velocities to the tangential and normal velocity of the leading foot
     projections(form.foot_x[LEADING], form.foot_y[LEADING], n, s, c, F, U)
     J = np.array([motion_gradient(form, LEADING, F, U, y, 2 + n + i)[1:] for i in range(2 + n)]).T
     v = y[2 + n :]

@@ -29,7 +29,7 @@ def read(path):
 
 
 def filled(time, values):
-    """Interpolate where a marker was hidden."""
+    """Fill in values by interpolation where a marker was hidden."""
     seen = np.isfinite(values)
     return np.interp(time, time[seen], values[seen])
 

@@ -16,13 +16,13 @@ from typing import Any
 
 WALKERLAB = ("-m", "walkerlab")
 BARE = ("-c", "import numpy, numba, h5py, pydantic, typer, ruamel.yaml")
-# cold commands, in this order, starting without compiled code
+# Commands that begin without compiled code. They run in this order.
 COLD = (
     ("cold: fixedpoint", (("fixedpoint",),)),
     ("cold: contact-sim after it", (("contact-sim",),)),
     ("cold: both of kneed after that", (("fixedpoint", "-c", "kneed"), ("contact-sim", "-c", "kneed"))),
 )
-# commands that print their own time, without start-up
+# Commands that print how long they took without the start of the process.
 STAGES = (
     ("basin, rigid, 300 x 300", ("basin", "--set", "basin.cells=[300,300]", "--set", "basin.refine=1")),
     ("basin, contact, 12 x 12", ("basin", "--set", "basin.model=contact", "--set", "basin.cells=[12,12]")),
@@ -31,7 +31,8 @@ STAGES = (
 )
 PROCESSES = "fixedpoint --force, as a process"
 BARE_IMPORTS = "bare imports"
-SAMPLES, SAMPLE_S = 5, 0.05  # number of samples of each warm call in one process, and time for which calls are repeated
+# number of samples of each warm call in one process, and the time for which a sample repeats it
+SAMPLES, SAMPLE_S = 5, 0.05
 WARM = """
 import json, sys
 sys.path[:0] = {folders!r}
@@ -42,7 +43,7 @@ Times = dict[str, list[float]]
 
 
 def print_speed(versions: Sequence[Any], wanted: str, rounds: int) -> None:
-    """Measure both versions in turn, and print a table with best and median of each, and their ratios."""
+    """Measure both versions in turn, and print a table with the best and the median time of each, and their ratios."""
     times: list[Times] = [{}, {}]
     for lap in range(rounds):
         # The versions take turns in going first, because each finds the machine as the other left it.
@@ -63,7 +64,7 @@ def print_speed(versions: Sequence[Any], wanted: str, rounds: int) -> None:
 
 
 def measured(version: Any, wanted: str) -> Iterator[tuple[str, float]]:
-    """Yield the name and the seconds of each figure of a version, once, or several samples for warm calls."""
+    """Yield the name of each figure and its seconds for a version: one measurement, or several for a warm call."""
     with tempfile.TemporaryDirectory(prefix="walkerlab-speed-") as folder:
         if any(re.search(wanted, figure) for figure, _ in COLD):
             cold = replace(version, cache=Path(folder) / "cache")
@@ -143,8 +144,8 @@ def warm_work() -> dict[str, Callable[[], Callable[[], Any]]]:
 
 
 def samples_of(work: Callable[[], Any]) -> list[float]:
-    """Return several samples of the seconds of a call, each the mean over calls that fill a moment. The first is not
-    counted.
+    """Return several samples of the time of a call (s). Each sample is the mean over repeated calls, and the first call
+    is not counted.
     """
     work()
     start = time.perf_counter()

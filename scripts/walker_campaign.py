@@ -1,4 +1,4 @@
-"""Search the gaits of random walkers of every type, and compare each chosen gait's multipliers with simulated steps.
+"""Find gaits of random walkers of every type, and compare the multipliers of each chosen gait with simulated steps.
 
     python scripts/walker_campaign.py                         # 200 walkers of each type, some two minutes
     python scripts/walker_campaign.py --walkers 20 --types kneed --seed 3
@@ -16,9 +16,9 @@ Four things are checked:
   ahead of the other. SciPy takes the same steps.
 `light-hips` are the compasses whose gaits are hardest to follow
 from a vanishing slope: without any start drawn at random both ordinary gaits must be found by name, and each repeat
-itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: each gait's cost of
-transport is held against SciPy's integral of the positive power.
-Prints a table in Markdown, then what went wrong; exits 1 if anything did.
+itself in one step of SciPy's DOP853. `kneed-torque` have a constant torque and a spring at the hip: the cost of
+transport of each gait is compared with SciPy's integral of the positive power.
+The script prints a table in Markdown, then what went wrong, and exits 1 if anything did.
 """
 
 from __future__ import annotations
@@ -67,23 +67,26 @@ from walkerlab.scene.parts import AnyWalker, assembly_of, knee_locked_at_strike
 Draw = np.random.Generator
 STEPS = 10
 ASIDE = 1e-6  # distance of starts from the gait, in units of leg length and gravity
-STILL_LINEAR = 1e-3  # distance from the gait up to which its derivative tells where a walk goes
-AGREES = 1e-4  # allowed difference of traces, relative to the derivative: rounding over ASIDE, and curvature
+STILL_LINEAR = 1e-3  # distance from the gait up to which the derivative predicts a walk
+# allowed difference of traces, relative to the derivative; covers rounding, divided by ASIDE, and curvature
+AGREES = 1e-4
 IMPULSES = 1e-8  # N s, allowed difference of impulses for a walker of some kilograms
 COSTS = 1e-7  # relative error of an integral whose power has a kink at each turn of the legs
 RTOL, ATOL, BUDGET = 1e-12, 1e-15, 1_000_000
-LONGEST_SEARCH_S = 60.0  # processor time (s); to a user, a longer search seems to hang
+LONGEST_SEARCH_S = 60.0  # processor time (s); a longer search would look to a user as if it hung
 SETTINGS = SearchSettings(random_starts=30)
 FOLLOWED_ONLY = SearchSettings(random_starts=0, further_starts=0)
-RETURNS_TO = 1e-7  # rad, rad/s: a tolerance of 1e-11 times the multipliers of an unstable gait
-OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60  # drawn where nothing is found, tried of those that walk; steps each
+RETURNS_TO = 1e-7  # rad, rad/s: the tolerance of 1e-11, magnified by the multipliers of an unstable gait
+# If no gait is found: number of random starts, number of them that are tried, and maximum number of step maps for each.
+OTHER_STARTS, TRIED, EVALUATIONS = 3000, 40, 60
 ROUGH_WALKERS, ROUGH_STEPS = (
     10,
     4,
-)  # number of walkers of a type, and of steps of each walk, which take SciPy some seconds
-ROUGHEST, SLOWEST, FASTEST = 0.01, 0.75, 1.05  # of the leg length; of the gait's rates, at the start
+)  # number of walkers of a type, and number of steps; with these SciPy takes some seconds
+# maximum roughness over the leg length; smallest and largest initial rates over those of the gait
+ROUGHEST, SLOWEST, FASTEST = 0.01, 0.75, 1.05
 SAME_TIME = 1e-6  # s, allowed difference of touch times
-SOLVED, APART = 1e-9, 1e-3  # residual of a gait; rad, half the angle between its legs at least
+SOLVED, APART = 1e-9, 1e-3  # residual of a gait; minimum of half the angle between its legs (rad)
 
 
 def straight_legs(draw: Draw) -> StraightLegs:
@@ -126,7 +129,7 @@ def kneed(draw: Draw, at_heel_strike: Literal["locked", "free"] = "locked") -> K
 
 
 def kneed_free(draw: Draw) -> Kneed:
-    """Draw the same with the trailing knee free during the heel strike."""
+    """Draw a kneed walker whose trailing knee is free during the heel strike."""
     return kneed(draw, "free")
 
 
@@ -190,7 +193,9 @@ def parts(draw: Draw) -> PartsWalker:
 
 
 def light_hips(draw: Draw) -> CompassWalker:
-    """Draw a hip no heavier than a leg, whose mass lies within a quarter of its length from the foot."""
+    """Draw a compass whose hip is no heavier than a leg, and whose leg masses lie within a quarter of the leg from the
+    foot.
+    """
     return CompassWalker(
         leg_length_m=1.0,
         foot_to_mass_m=draw.uniform(0.02, 0.25),
@@ -201,7 +206,7 @@ def light_hips(draw: Draw) -> CompassWalker:
 
 
 def torque_and_spring(draw: Draw) -> dict[str, Any]:
-    """Draw a constant torque and a spring at the hip, as fields of the rigid model."""
+    """Draw a constant torque and a spring at the hip, and return them as fields of the rigid model."""
     return {"hip": (draw.uniform(0.0, 3.0), 0.0, draw.uniform(0.02, 0.4))}
 
 
@@ -224,13 +229,13 @@ class Tally:
     ends: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
-    steps_seen: int = 0  # number of steps whose effect was compared with the multipliers
-    short_landings: int = 0  # number of walks on rough ground that end with one foot just ahead of the other
-    overlooked: int = 0  # number of searches without a gait where another method finds one
+    steps_seen: int = 0  # number of steps over which multipliers were checked
+    short_landings: int = 0  # number of walks on rough ground that end because a foot lands just ahead of the other
+    overlooked: int = 0  # number of walkers for which only another method finds a gait
 
 
 def tally(name: str, walkers: int, seed: int) -> Tally:
-    """Search the gaits of this number of random walkers of a type."""
+    """Search for gaits of random walkers of one type, and count the results."""
     draw, found = np.random.default_rng(seed), Tally()
     for index in range(walkers):
         light = name == "light-hips"
@@ -241,7 +246,7 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
             walker = walker.changed(**torque_and_spring(draw))
         start = time.process_time()
         search = find_gaits(walker, settings=FOLLOWED_ONLY if light else SETTINGS)
-        # The first search of a type compiles.
+        # The first search of a type compiles, so it may take longer.
         spent = time.process_time() - start if index else 0.0
         found.slowest_s = max(found.slowest_s, spent)
         faults, steps = (ordinary_faults(walker, search), 0) if light else judged(walker, search)
@@ -304,15 +309,15 @@ def judged(walker: RigidModel, search: GaitSearch) -> tuple[list[str], int]:
 
 
 def impulse_faults(assembly: Assembly, walker: RigidModel, search: GaitSearch) -> list[str]:
-    """Yield gaits whose heel strike needs another impulse than the momentum of the masses requires, or an unreported
-    pull.
+    """Yield a fault if a heel strike has another impulse than the momentum of the masses requires, or needs a pull that
+    was not reported.
     """
     faults = []
     for gait in search.gaits:
         step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
         before, after = (momentum_of_masses(assembly, walker.slope, y[0])[1] for y in (step.before, step.after))
         told, said = gait.min_normal_impulse, any("in a strike" in one for one in gait.objections)
-        # of knees the other strike may need the lesser impulse
+        # With knees, the other strike may be the one with the smaller impulse.
         off = told - (after - before)
         if off > IMPULSES or (off < -IMPULSES and gait.knee_strike is None) or said != (told < 0.0):
             faults.append(f"a heel strike's impulse is {after - before:.6g} N s, told is {told:.6g}")
@@ -320,8 +325,8 @@ def impulse_faults(assembly: Assembly, walker: RigidModel, search: GaitSearch) -
 
 
 def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
-    """Yield gaits whose cost of transport differs from a plain integral of gravity's work and the positive work of the
-    torque.
+    """Yield a fault if the cost of transport of a gait differs from a plain integral of gravity's work and the positive
+    work of the torque.
     """
     faults = []
     for gait in search.gaits if walker.hip[2] != 0.0 else ():
@@ -334,8 +339,8 @@ def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
 
 
 def rough_walk(walker: RigidModel, gait: RigidGait, draw: Draw) -> tuple[list[str], bool]:
-    """Return the fault of a walk over random heights from near a gait, and whether a foot landed just ahead of the
-    other.
+    """Simulate a walk over random heights that starts near a gait. Return its fault, if any, and whether a foot landed
+    just ahead of the other.
     """
     n, nearest = len(gait.state) // 2, SHORTEST_LANDING * gait.step_length
     share = draw.uniform(SLOWEST, FASTEST)
@@ -356,7 +361,7 @@ def rough_walk(walker: RigidModel, gait: RigidGait, draw: Draw) -> tuple[list[st
 
 
 def ordinary_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
-    """Yield faults of the two ordinary gaits, the chosen one among them."""
+    """Yield faults of the two ordinary gaits, one of which is the chosen gait."""
     found = {name: [gait for gait in search.gaits if name in gait.found_by] for name in (LONG_PERIOD, SHORT_PERIOD)}
     faults = [f"no gait from the {name}" for name, gaits in found.items() if not gaits]
     if not faults and found[LONG_PERIOD] == found[SHORT_PERIOD]:
@@ -372,17 +377,16 @@ def ordinary_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
 
 
 def traces(walker: RigidModel, gait: RigidGait) -> Iterator[tuple[float, float, float]]:
-    """Yield for one to ten steps the trace of the observed derivative, the sum of powers of multipliers, and the
-    derivative's size.
-
-    Ends where the distance of the starts from the gait is no longer linear, or a walk ends.
+    """Yield, for each number of steps from one to ten, the trace of the observed derivative, the sum of powers of the
+    multipliers, and the norm of the derivative. Stop when the walks are no longer close enough to the gait for a linear
+    prediction, or when one ends.
     """
     unit, units = unit_walker(walker)
     n = len(gait.state) // 2
     z = coordinates_of(unit, (*gait.state[:n], *(rate * units.time for rate in gait.state[n:])))
     whole, half = (differences(unit, z, aside) for aside in (ASIDE, 0.5 * ASIDE))
     for k in range(min(len(whole), len(half))):
-        # The effect of curvature falls with the square of this distance.
+        # The effect of curvature is proportional to the square of this distance.
         seen = (4.0 * half[k] - whole[k]) / 3.0
         size = float(np.linalg.norm(seen))
         if size * ASIDE > STILL_LINEAR:
@@ -391,7 +395,7 @@ def traces(walker: RigidModel, gait: RigidGait) -> Iterator[tuple[float, float, 
 
 
 def differences(walker: RigidModel, z: NDArray[np.float64], aside: float) -> NDArray[np.float64]:
-    """Return (steps, d, d) the differences between walks from either side of z, per unit of the distance of their
+    """Return the differences (steps, d, d) between walks that start on either side of z, per distance between the
     starts.
     """
     pairs = [(walked(walker, z + move), walked(walker, z - move)) for move in aside * np.eye(z.size)]
@@ -400,7 +404,7 @@ def differences(walker: RigidModel, z: NDArray[np.float64], aside: float) -> NDA
 
 
 def walked(walker: RigidModel, z: NDArray[np.float64]) -> list[Any]:
-    """Return section coordinates after each of ten steps from z."""
+    """Return the section coordinates after each of ten steps from z."""
     tolerances = Tolerances("dop853", RTOL, ATOL, BUDGET)
     return [
         coordinates_of(walker, y)

@@ -1,5 +1,5 @@
-"""Compare the time of a warm `walkerlab simulate` as a whole process with that of a bare process that does only the
-work.
+"""Compare the time of a whole `walkerlab simulate` process, with compiled code, with that of a bare process that only
+simulates the walk.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from statistics import median
 
-# imports only what a walk needs, calls its compiled kernel, and writes the numbers
+# Imports only what a walk needs, calls the compiled kernel, and writes the numbers.
 BARE = """
 import sys
 import h5py

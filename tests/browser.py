@@ -1,4 +1,4 @@
-"""Control a headless Chromium over a pipe by its own protocol, which needs nothing but the browser."""
+"""Control a headless Chromium by its own protocol over a pipe. Nothing but the browser is needed."""
 
 import base64
 import contextlib
@@ -25,7 +25,7 @@ FLAGS = (
     "--hide-scrollbars",
     "--remote-debugging-pipe",
 )
-PATIENCE = 240.0  # s; what a page has made is made at low priority, beside other tests
+PATIENCE = 240.0  # s; pages compute at low priority while other tests run
 
 
 def executable():
@@ -48,7 +48,7 @@ class Browser:
         self.folder = tempfile.mkdtemp(prefix="walkerlab-chromium-")
         to_browser, self.write_end = os.pipe()
         self.read_end, from_browser = os.pipe()
-        # The protocol is spoken on the descriptors 3 and 4.
+        # Chromium reads requests from descriptor 3 and answers on descriptor 4.
         shell = f'exec "$@" 3<&{to_browser} 4>&{from_browser}'
         command = ["bash", "-c", shell, "bash", path, *FLAGS, f"--user-data-dir={self.folder}", "about:blank"]
         self.process = subprocess.Popen(
@@ -113,7 +113,7 @@ class Browser:
             time.sleep(0.02)
 
     def holds(self, expression):
-        """Whether an expression holds; not while another page is being loaded."""
+        """Whether an expression is true. While another page is being loaded, the answer is no."""
         try:
             return self.evaluate(expression)
         except PageLeftError:
@@ -137,7 +137,7 @@ class Browser:
         return [url for url in sent if not url.startswith("data:")]
 
     def complaints(self):
-        """Return what scripts and the browser wrote to the console."""
+        """Return the messages that scripts and the browser wrote to the console."""
         kinds = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
         return [event["params"] for event in self.events if event["method"] in kinds]
 

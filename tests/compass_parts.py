@@ -1,4 +1,4 @@
-"""The compass walker described by its parts, measure by measure."""
+"""The compass walker built from its parts."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Particle
 
 @dataclass(frozen=True)
 class CompassParts:
-    """Measures of a compass walker, SI."""
+    """Lengths, masses and inertias of a compass walker in SI units."""
 
     leg_length_m: float
     foot_to_mass_m: float
@@ -18,9 +18,10 @@ class CompassParts:
 
 
 def compass_assembly(parts: CompassParts) -> Assembly:
-    """Two legs hinged at a hip that is a point mass; each leg's frame has its origin at the hip and points up the leg.
+    """Build two legs that are hinged at a hip, which is a point mass. The frame of each leg has its origin at the hip
+    and points up the leg.
 
-    A ball foot's centre is L - r from the hip, so that an upright leg reaches L.
+    The centre of a ball foot is L - r from the hip, so that an upright leg has length L.
     """
     mass_at = (0.0, parts.foot_to_mass_m - parts.leg_length_m)
     foot_at = (0.0, parts.foot_radius_m - parts.leg_length_m)

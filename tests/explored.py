@@ -15,7 +15,8 @@ class Served:
     def __init__(self, folder, *options):
         command = [sys.executable, "-m", "walkerlab", "explore", "--no-browser", "--runs", "runs", *options]
         self.folder = folder
-        self.process = subprocess.Popen(  # as from a terminal: a script's background job ignores Ctrl-C
+        # Start it as a terminal does, because the background job of a script ignores Ctrl-C.
+        self.process = subprocess.Popen(
             command, stdout=subprocess.PIPE, text=True, cwd=folder,
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )  # fmt: skip
@@ -27,7 +28,8 @@ class Served:
     def asked(self, path, body=None, **headers):
         """Return status and answer of a request. It carries the token unless other headers are given."""
         text = body if body is None or isinstance(body, str) else json.dumps(body)
-        # Closed whatever happens: an error keeps the socket alive, and warns when it is freed, in any later test.
+        # Close the socket in any case. An error would keep it alive, and it would then raise a warning in some later
+        # test.
         with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)) as connection:
             connection.request("GET" if body is None else "POST", path, text, headers or self.bearer)
             answer = connection.getresponse()

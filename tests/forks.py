@@ -1,6 +1,6 @@
-"""Run programs in forks of a process that has loaded the libraries. They are separate, and save a second of imports.
-
-Run as a script it is that one: it forks for every line of JSON that it reads, and answers with the exit code.
+"""Run programs in forks of a process that has loaded the libraries. The forks are separate processes, but each saves a
+second of imports. Run as a script, this module is the process that is forked: once for every line of JSON that it
+reads. It answers with the exit code.
 """
 
 import atexit
@@ -27,10 +27,10 @@ LONGEST_S = 120
 
 
 class Forks:
-    """The process that is forked."""
+    """Handle of the process that is forked."""
 
     def __init__(self):
-        # a library's threads do not come along
+        # Threads of libraries would not exist in the fork.
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
         self.process = subprocess.Popen(
             [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, text=True
@@ -38,7 +38,7 @@ class Forks:
         atexit.register(self.process.communicate)
 
     def run(self, module, arguments, folder, environment):
-        """Run `python -m module arguments` in a folder and wait for its end."""
+        """Run `python -m module arguments` in a folder, and wait until it ends."""
         with tempfile.TemporaryDirectory() as place:
             said = [Path(place, name) for name in ("stdout", "stderr")]
             asked = (module, [str(one) for one in arguments], str(folder), environment, [str(path) for path in said])
@@ -56,7 +56,7 @@ def forks():
 
 
 def loaded_with_the_package():
-    """The modules of the package that most commands load."""
+    """List the modules of the package that most commands load."""
     for name in PACKAGES:
         package = importlib.import_module(f"walkerlab.{name}")
         yield from (
@@ -65,7 +65,9 @@ def loaded_with_the_package():
 
 
 def serve():
-    """Fork for each request. Return what to run in the child, and None in the parent at the end."""
+    """Fork for each request. In the child, return the request to run. In the parent, return None when there are no more
+    requests.
+    """
     for line in sys.stdin:
         if not (child := os.fork()):
             return json.loads(line)
@@ -74,7 +76,7 @@ def serve():
 
 
 def become(module, arguments, folder, environment, said):
-    """Run `python -m module` in a folder, in place of this process."""
+    """Turn this process into `python -m module`, run in a folder."""
     signal.alarm(LONGEST_S)
     for number, path in enumerate((os.devnull, *said)):
         file = os.open(path, os.O_RDWR | os.O_CREAT)
@@ -89,7 +91,7 @@ def become(module, arguments, folder, environment, said):
 
 
 def to_the_end(asked):
-    """Run the request and exit without unloading the libraries, which would take longer than most runs."""
+    """Run the request, then exit without unloading the libraries, because this would take longer than most runs."""
     code = 0
     try:
         become(*asked)

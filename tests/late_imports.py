@@ -5,7 +5,7 @@ import sys
 
 
 def import_late(name):
-    """Return the module, which is loaded with the first of its attributes that is used."""
+    """Return a stand-in for the module that loads it when an attribute is first used."""
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.find_spec(name)

@@ -1,4 +1,4 @@
-"""Measured walks by the plain integration, which shares no code with the estimation of parameters."""
+"""Synthetic measurements of walks by the plain integration, which shares no code with the estimation of parameters."""
 
 import numpy as np
 from plain_rigid_walk import plain_walk

@@ -1,4 +1,4 @@
-"""Simulate a rigid walk over footholds of any height in Python, event by event, with a library's integrator."""
+"""Simulate a rigid walk over footholds of any height in Python, event by event, with the integrator of a library."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -9,14 +9,15 @@ from walkerlab.physics.mechanics import impact
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, BENT, NO_SHANK, STANCE, STRAIGHT, Mode
 from walkerlab.physics.solvers.system import derivative
 
-LATEST = 10.0  # pendulum times that a swing may take
-CLOSEST_LOOK = 0.01  # pendulum times: two crossings of a foothold's height within less are missed
-RELEASED, PASSED = 1e-3, 1e-6  # s, in which a knee has left the line, and a foot the height of its foothold
+LATEST = 10.0  # maximum duration of a swing, in pendulum times
+CLOSEST_LOOK = 0.01  # pendulum times; two crossings of the height of a foothold within less time are missed
+# s; after this time a knee is no longer straight, and a foot no longer at the height of its foothold
+RELEASED, PASSED = 1e-3, 1e-6
 EXACT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13}
 
 
 def foot_of(walker, y):
-    """Return a foot's position ahead of and above the present contact point (m), from the levers' definition."""
+    """Return how far a foot is ahead of and above the present contact point (m), by the definition of the levers."""
     psi = np.array(y[: len(walker.arm_x)]) + walker.slope
     return (
         float(np.cos(psi) @ walker.foot_x - np.sin(psi) @ walker.foot_y),
@@ -25,7 +26,7 @@ def foot_of(walker, y):
 
 
 def hip_over_fall(walker, y):
-    """Return the hip's height above that at which a walker counts as fallen (m)."""
+    """Return how much higher the hip is (m) than where the walker counts as fallen."""
     psi = y[STANCE] + walker.slope
     height = walker.radius + np.sin(psi) * walker.hip_x + np.cos(psi) * walker.hip_y
     return height - FALLEN_HIP * walker.leg_length
@@ -58,7 +59,9 @@ def plain_walk(walker, y, heights, nearest=0.0, disturb=lambda y: y, pieces=None
 
 
 def swing(walker, t, y, rise, pieces=None):
-    """Time and state at which a swing ends, and how: WALKED if the foot comes down ahead on a straight leg."""
+    """Return time and state at the end of a swing, and its outcome: WALKED if the foot lands ahead on a
+    straight leg.
+    """
     pendulum_time = np.sqrt(walker.leg_length / walker.gravity)
     kneed = walker.shank != NO_SHANK
     phase, end, left_s = BENT if kneed else STRAIGHT, t + LATEST * pendulum_time, RELEASED
@@ -82,7 +85,7 @@ def swing(walker, t, y, rise, pieces=None):
     dense = {**EXACT, "dense_output": pieces is not None}
     pieces = [] if pieces is None else pieces
     while True:
-        if left_s:  # what has just been left is not met again
+        if left_s:  # An event that has just occurred must not be found again.
             passed = solve_ivp(rate, (t, t + left_s), y, **dense)
             pieces.append(passed)
             t, y = passed.t[-1], passed.y[:, -1]

@@ -32,7 +32,7 @@ class Leg:
 
     @property
     def centre(self):
-        """Centre of the foot's arc in the straight leg, from the hip."""
+        """Return the centre of the foot's arc of a straight leg, measured from the hip."""
         return np.array([self.centre_ahead, self.radius - self.length])
 
     def masses(self, angles):
@@ -65,7 +65,7 @@ def quarter(vector):
 
 @dataclass(frozen=True)
 class Swing:
-    """Swing of one leg while the other stands; angle 0 is the swing thigh's, 1 the stance leg's, 2 a free shank's."""
+    """Swing of one leg on the other. Angle 0 is that of the swing thigh, 1 of the stance leg, and 2 of a free shank."""
 
     swinging: Leg
     standing: Leg
@@ -80,7 +80,7 @@ class Swing:
         return 3 if self.free_shank else 2
 
     def bodies(self):
-        """Yield mass, inertia, angle index and levers from the stance foot's centre."""
+        """Yield mass, inertia, angle index and levers from the stance foot's centre for each body."""
         swing_angles = [0, 2 if self.free_shank else 0][: len(self.swinging.segments)]
         to_hip = -self.standing.centre
         yield self.hip_mass, 0.0, 1, {1: to_hip}
@@ -97,7 +97,9 @@ class Swing:
         return levers
 
     def place(self, q, levers):
-        """Position from the point at which an upright stance leg touches, and its derivative (2, n)."""
+        """Return a position, measured from where an upright stance leg touches, and its derivative (2, n) by the
+        angles.
+        """
         R = self.standing.radius
         at, J = np.array([-R * q[1], R]), np.zeros((2, self.n))
         J[0, 1] = -R
@@ -132,7 +134,7 @@ class Swing:
         return self.place(q, self.foot())[0][0] + self.standing.radius * q[1]
 
     def momentum(self, q, w, about, of=None):
-        """Angular momentum about a point; `of` selects the bodies by their angles."""
+        """Return the angular momentum about a point. `of` selects bodies by their angles."""
         # about the hip, the hip mass has no angular momentum
         total = 0.0
         for mass, inertia, angle, levers in self.bodies():
@@ -156,7 +158,9 @@ def linear_solve(balance, n):
 
 @dataclass(frozen=True)
 class Walker:
-    """Two legs on a hip mass; leg 0 swings first. Dampers act at the knees, push-offs (N s) along trailing legs."""
+    """Two legs on a hip mass, of which leg 0 swings first. Dampers act at the knees, and push-offs (N s) along trailing
+    legs.
+    """
 
     legs: tuple[Leg, Leg]
     hip_mass: float
@@ -170,7 +174,8 @@ class Walker:
         return Swing(self.legs[k], self.legs[1 - k], self.hip_mass, self.slope, self.gravity, free_shank, damping)
 
     def step(self, k, q, w, rise=0.0, swings=None):
-        """Return duration, length, angles and rates after a step of leg k, from those of swing and stance leg.
+        """Take a step of leg k from the angles and rates of swing and stance leg. Return duration, length, and the new
+        angles and rates.
 
         The foot lands on a foothold `rise` (m) above the stance foot's. The solution of the straight swing is appended
         to `swings`, if given.
@@ -234,7 +239,7 @@ class Walker:
 
 
 def integrate(system, y, event, direction):
-    """Integrate up to three seconds and return the run with all zeros of an event function."""
+    """Integrate for up to three seconds, and return the solution with all zeros of an event function."""
     event_of = lambda t, y: event(t, y)  # noqa: E731 (functions of classes take no attributes)
     event_of.direction = direction
     settings = {"rtol": 1e-12, "atol": 1e-12, "max_step": 0.05, "dense_output": True}

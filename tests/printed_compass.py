@@ -1,4 +1,4 @@
-"""Appendix A's released matrix, energies, forces and feet, typed from the paper for all tests."""
+"""Released mass matrix, energies, forces and feet of the compass as Appendix A prints them, for all tests."""
 
 import math
 
@@ -9,7 +9,7 @@ from walkerlab.physics.mechanics.trigonometry import sine_cosine
 
 
 def released_mass_matrix(L, a, m, M_H, theta_1, theta_2):
-    """D_e from (A.9) to (A.24): angles, then the stance foot's coordinates."""
+    """Return D_e from (A.9) to (A.24). Its rows are the angles, then the coordinates of the stance foot."""
     b, K = L - a, L * m + a * m + L * M_H
     s_1, c_1, s_2, c_2 = math.sin(theta_1), math.cos(theta_1), math.sin(theta_2), math.cos(theta_2)
     coupling = -m * L * b * math.cos(theta_2 - theta_1)
@@ -24,20 +24,21 @@ def released_mass_matrix(L, a, m, M_H, theta_1, theta_2):
 
 
 def kinetic_energy(walker, theta_1, theta_2, omega_1, omega_2):
-    """Kinetic energy (J): half of dq' D dq."""
+    """Return the kinetic energy (J), half of dq' D dq."""
     c = swing_constants(walker)
     d12 = -c.mLb * math.cos(theta_2 - theta_1)
     return 0.5 * (c.d11 * omega_1 * omega_1 + c.d22 * omega_2 * omega_2) + d12 * omega_1 * omega_2
 
 
 def potential_energy(walker, theta_1, theta_2):
-    """Potential energy (J) from the current stance foot."""
+    """Return the potential energy (J) above the current stance foot."""
     c = swing_constants(walker)
     return walker.gravity * (c.K * math.cos(theta_2) - c.mb * math.cos(theta_1))
 
 
 def ground_reaction(walker, theta_1, theta_2, omega_1, omega_2):
-    """Force of the ground on the stance foot (N): along the slope (positive in walking direction) and normal to it.
+    """Return the force of the ground on the stance foot (N), along the slope (positive in walking direction) and normal
+    to it.
 
     Rows 3 and 4 of (6) with the foot held still: (A.11) to (A.16), (A.33) to (A.38).
     """
@@ -53,16 +54,17 @@ def ground_reaction(walker, theta_1, theta_2, omega_1, omega_2):
 
 
 def swing_foot_height(walker, theta_1, theta_2):
-    """Height of the swing foot above the slope (m), negative while it scuffs.
+    """Return the height of the swing foot above the slope (m), which is negative while it scuffs.
 
-    L (cos(theta_2 + phi) - cos(theta_1 + phi)) as a product, which keeps its digits near zero.
+    It is L (cos(theta_2 + phi) - cos(theta_1 + phi)), written as a product to keep its digits near zero.
     """
     half_sum = 0.5 * (theta_1 + theta_2) + walker.slope
     return 2.0 * walker.leg_length * math.sin(half_sum) * math.sin(0.5 * (theta_1 - theta_2))
 
 
 def feet_on_slope(walker, theta_1, theta_2):
-    """theta_1 + theta_2 + 2 phi (rad): zero with both feet on the slope, falling through zero at heel strike.
+    """Return theta_1 + theta_2 + 2 phi (rad), which is zero with both feet on the slope and falls through zero at heel
+    strike.
 
     (9-2) prints theta_1 = -theta_2, which holds only for angles measured from the slope's normal.
     """

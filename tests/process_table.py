@@ -1,4 +1,4 @@
-"""Read the kernel's table of processes, so that tests can check that none is left."""
+"""Read the kernel's table of processes, with which tests check that no process is left."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def processes_below(parent):
 
 
 def workers_below(parent):
-    """Return those descendants that are workers of the package."""
+    """Return the ids of descendants of a process that are workers of the package."""
     return [pid for pid in processes_below(parent) if "walkerlab.pipeline.run.workers" in command_of(pid)]
 
 
@@ -36,7 +36,9 @@ def command_of(pid):
 
 
 def is_alive(pid):
-    """Whether a process runs: one that was killed does until all its threads have ended, and may be waited for then."""
+    """Whether a process still runs. A killed process runs until all its threads have ended. It may then still have to
+    be waited for.
+    """
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

@@ -1,4 +1,4 @@
-"""Results that stages store of a small run of the paper's walker. Results for other tests are derived from them."""
+"""Results that the stages store for a small run of the paper's walker. Other tests derive their results from them."""
 
 import functools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The rigid model's functions in Python, for states in tuples. Scratch memory begins as NaN."""
+"""Functions of the rigid model in Python for states in tuples, with scratch memory that begins as NaN."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -43,7 +43,7 @@ def knee_strike(model, y, columns=()):
 
 
 def struck(phase, model, y, columns):
-    """Return the state after a strike, with the images of directions after it."""
+    """Return the state after a strike, and the columns of directions after it."""
     before = np.concatenate((y, *columns))
     after = np.full(before.size, np.nan)
     impact.strike(model, model, phase, before, after)
@@ -51,7 +51,8 @@ def struck(phase, model, y, columns):
 
 
 def torque_work_of_a_step(model, start, step):
-    """Work (J) of the constant hip torque in a step, net and positive: SciPy's integral of its power, phase by phase.
+    """Return the net and the positive work (J) of the constant hip torque in a step, as SciPy's integral of its power
+    in each phase.
 
     step  a walk of one step from `start`, which has the times of its strikes
     """
@@ -66,7 +67,7 @@ def torque_work_of_a_step(model, start, step):
             power = torque * (x[n + SWING] - x[n + STANCE])
             return (*x[n : 2 * n], *rates(model, phase, tuple(x[: 2 * n])), power, max(0.0, power))
 
-        # no step is long enough to leap over two turns of the legs
+        # No solver step is so long that it could skip two turns of the legs.
         swing = solve_ivp(rate, (t, *end), (*y, 0.0, 0.0), "DOP853", rtol=1e-11, atol=1e-13, max_step=2e-2)
         y, t, work = swing.y[: 2 * n, -1], end[0], work + swing.y[2 * n :, -1]
         y = np.array(knee_strike(model, y)) if phase == BENT else y
@@ -80,7 +81,9 @@ def state_linked(model, phase, y):
 
 
 def momentum_of_masses(assembly, slope, y):
-    """Sum the masses' momentum along and normal to the slope (kg m/s), standing on the assembly's second foot."""
+    """Return the momentum of all masses along and normal to the slope (kg m/s). The assembly stands on its
+    second foot.
+    """
     members = group_bodies(assembly).members
     theta, omega = members @ np.array(y).reshape(2, -1)[0], members @ np.array(y).reshape(2, -1)[1]
     foot = assembly.feet[1]

@@ -74,7 +74,7 @@ def test_importing_the_package_loads_nothing():
 
 
 def test_stages_do_not_depend_on_the_python_interface():
-    """Otherwise every result would be out of date after an edit of a docstring in the interface."""
+    """If they did, editing a docstring of the interface would make every result out of date."""
     names = {module.name for module in Sources().closure("walkerlab.pipeline.stages.fixedpoint")}
     assert "walkerlab" in names
     assert "walkerlab.api" not in names
@@ -444,7 +444,7 @@ def test_mujoco_model_is_built_from_a_run_a_config_or_a_name(mujoco, tmp_path):
         model, data = walkerlab.mujoco_model(config)
         assert data.qpos == pytest.approx(model.key("gait").qpos, abs=0.0)
         mujoco.mj_step(model, data, 36_000)
-        # its swing knee has locked, at .3486 s
+        # By then the swing knee has locked, at 0.3486 s.
         assert data.eq_active.all()
 
 
@@ -454,7 +454,7 @@ def test_mujoco_model_of_a_gait_starts_on_that_gait(mujoco, tmp_path):
     for gait in (stored, heavy):
         model, data = walkerlab.mujoco_model(gait)
         slope = np.arctan2(model.opt.gravity[0], -model.opt.gravity[2])
-        # the base is the leg that stands first
+        # The base body is the first stance leg.
         assert data.qpos[2] - slope == pytest.approx(gait.state[1], abs=1e-12)
         last = model.numeric("steps_in_walkerlab").data.reshape(2, -1)[:, -1]
         assert last == pytest.approx([gait.period_s, gait.step_length_m], rel=0.05)

@@ -12,7 +12,7 @@ from walkerlab.physics.kernel_cache import KERNEL_HOMES
 from walkerlab.pipeline.plan.graph import PIPELINE
 
 PACKAGE = Path(walkerlab.__file__).parent
-# each imports only those after it
+# Each layer imports only layers further down in this list.
 LAYERS = (
     "api",
     "evidence.verification",
@@ -59,7 +59,7 @@ COMPILING = {"kernel", "kernel_part", "forced_inline", "dispatch_by_type", "disp
 
 
 def layer_of_module(name):
-    """The layer that a module belongs to, the longest that its name begins with; empty outside of all."""
+    """Return the layer of a module: the longest one with which its name begins, or an empty string if there is none."""
     layers = [layer for layer in LAYERS if f"{name}.".startswith(f"walkerlab.{layer}.")]
     return max(layers, key=len, default="")
 
@@ -105,7 +105,7 @@ def test_docs_list_the_same_layers():
 
 
 def exceptions(found, paths=IN_LAYERS):
-    """Return what `found` finds in each file, without files in which it finds nothing."""
+    """Return what the function `found` finds in each file. Files in which it finds nothing are skipped."""
     return {named(path): names for path in paths if (names := found(path))}
 
 
@@ -133,7 +133,9 @@ def test_compiled_functions_are_in_layers_covered_by_the_cache_key():
 
 
 def test_compiled_functions_import_only_code_covered_by_the_cache_key():
-    """A constant from elsewhere would be frozen into machine code that its change does not renew."""
+    """Otherwise a constant from elsewhere would be compiled into machine code, which would not be renewed when the
+    constant changes.
+    """
     covered = {*KERNEL_LAYERS, "physics.kernels", "physics.energy_channels", "outcome", "errors"}
     compiled = [path for path in IN_LAYERS if layer_of(path) in KERNEL_LAYERS]
     assert compiled

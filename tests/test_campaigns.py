@@ -1,4 +1,6 @@
-"""Run the campaigns of scripts/ briefly: kills, parallel runs, fuzzed configs, damage, random walkers, speed."""
+"""Run short versions of the campaigns in scripts/: kills, parallel runs, fuzzed configs, damage, random
+walkers, speed.
+"""
 
 import importlib.util
 import sys
@@ -19,7 +21,7 @@ MARKUP = "<script>alert(1)</script>"
 
 
 def script(name):
-    sys.path.insert(0, str(SCRIPTS))  # as for a script that is run
+    sys.path.insert(0, str(SCRIPTS))  # Python does the same for a script that is run.
     spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -71,7 +73,7 @@ def test_both_gaits_of_random_walkers_with_light_hips_are_found():
 
 
 def test_short_landings_on_rough_ground_agree_with_an_independent_integrator():
-    """Landings just ahead of the other foot, which once were steps, are among what is drawn."""
+    """The random walks include landings just ahead of the other foot, which must not count as steps."""
     found = script("walker_campaign").tally("straight-legs", 8, seed=1)
     assert found.wrong == []
     assert found.short_landings > 0
@@ -91,7 +93,8 @@ def test_benchmark_compares_methods_of_sufficient_accuracy(monkeypatch):
     against_numpy, against_ours, smallest = benchmark.rigid_lines(benchmark.Stopwatch(1, 0.0))
     assert " x: dop853 " in against_numpy.measured
     assert " x: dop853 " in against_ours.measured
-    assert smallest.verdict != benchmark.MISSED  # an error, not a time
+    # This row is about an error and not about a time, so it must not be missed on any machine.
+    assert smallest.verdict != benchmark.MISSED
 
 
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])

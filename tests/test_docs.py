@@ -1,4 +1,4 @@
-"""Check README and docs: links lead somewhere, commands are accepted, and tables and outputs are those of the tool."""
+"""Check README and docs: links have targets, commands are accepted, and tables and outputs are those of the program."""
 
 import base64
 import json
@@ -44,7 +44,7 @@ BUG, USAGE, BAD_CONFIG = 1, 2, 3
 
 @cache
 def whole_program():
-    """The command line as click's commands."""
+    """Return the command line as a click command."""
     return get_command(program())
 
 
@@ -53,7 +53,7 @@ def text_of(path):
 
 
 def code_in(path):
-    """Yield what stands in backticks or in a fenced block."""
+    """Yield each text in backticks or in a fenced block."""
     text = text_of(path)
     yield from re.findall(r"^ *```[a-z]*\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE)
     yield from re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text)
@@ -75,7 +75,7 @@ def test_links_lead_to_existing_files(path):
 
 
 def anchors(page):
-    """Anchors of a page's headings, as GitHub makes them."""
+    """Return the anchors that GitHub makes for the headings of a page."""
     text = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.DOTALL | re.MULTILINE)
     headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     return {re.sub(r"[^\w -]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
@@ -88,7 +88,7 @@ def test_links_lead_to_existing_headings(path):
 
 
 def code_to_add():
-    """The Python of the page that says how to add something: figure, stage (its type, its module, its entry), law."""
+    """Return the Python examples of docs/adding.md: figure, stage (type, module, registry entry) and law."""
     return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "adding.md"), re.DOTALL | re.MULTILINE)
 
 
@@ -149,14 +149,14 @@ def test_files_and_names_in_the_developer_pages_exist(page):
 
 
 def places():
-    """Return the folders in which a file that a document names may be."""
+    """Return the folders that may contain a file named in a document."""
     package = ROOT / "walkerlab"
     return (ROOT, package, *(path for path in package.iterdir() if path.is_dir()))
 
 
 @cache
 def named_runs():
-    """Return the runs that commands of the documents name."""
+    """Return the names of runs in the commands of the documents."""
     return {name for command in commands() for name in re.findall(r"--name (\S+)", command)}
 
 
@@ -167,12 +167,12 @@ def test_documented_command_is_accepted(command, tmp_path, monkeypatch):
     words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
     runs = [word for word in words if word.startswith("runs/") or (word in named_runs() and "--name" not in words)]
     if runs:
-        # the paper's own config instead of a run that is not there
+        # Use the paper's config in place of a run that does not exist.
         words = [word for word in words if word not in runs and word != "-c"]
     for name in (word for word in words if word.endswith(".yaml") and not word.startswith("configs/")):
         (tmp_path / name).write_text("extends: paper\n", encoding="utf-8")
     if words[0] == "show":
-        (tmp_path / "runs" / "paper").mkdir(parents=True)  # a run, without results
+        (tmp_path / "runs" / "paper").mkdir(parents=True)  # A folder is enough for a run without results.
     dry = [] if words[0] in ANSWER_AT_ONCE else ["--dry-run"]
     done = CliRunner().invoke(program(), [*words, *dry])
     assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
@@ -191,7 +191,8 @@ def test_documented_run_commands_have_their_options(command):
     if words:
         asked.make_context(name, words)
     else:
-        assert name in ("open", "init", "check")  # the paper's run; a command named in a sentence
+        # These commands need no word: they act on the paper's run, or a sentence only names them.
+        assert name in ("open", "init", "check")
 
 
 def test_every_command_is_in_the_docs():
@@ -209,7 +210,9 @@ def test_documented_config_is_accepted(text, tmp_path):
 
 
 def run(command, exit_code_before):
-    """Run a command as in a shell. A command of the package alone runs in a process that has the libraries loaded."""
+    """Run a command as in a shell. A plain command of the package runs in a fork that has already loaded the
+    libraries.
+    """
     name, *words = shlex.split(command)
     if name != "walkerlab" or {"|", ";", "&&", ">", "<"} & {*words}:
         return MAKER["run_in_shell"](command, exit_code_before)

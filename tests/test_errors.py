@@ -1,4 +1,4 @@
-"""Check that every failure on which a user can act has its message, its advice and its exit code."""
+"""Check that every failure on which a user can act has a message, advice and an exit code."""
 
 import pickle
 

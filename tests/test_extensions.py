@@ -1,4 +1,4 @@
-"""Tests of extensions by other packages: the example of the docs, and faulty ones, installed as pip does."""
+"""Tests of extensions in other packages: the example of the docs and faulty ones, installed in the way of pip."""
 
 import json
 import os
@@ -23,7 +23,7 @@ PACKAGE = "tanh_friction"
 
 
 def announce(folder, distribution, entries):
-    """Write what tells Python that a distribution of version 1.0 is installed in a folder."""
+    """Write the metadata of a distribution, version 1.0, that is installed in a folder."""
     info = folder / f"{distribution.replace('-', '_')}-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
@@ -38,7 +38,7 @@ def install_example(folder):
 
 
 def add(folder, distribution, text, **entries):
-    """Install a package of one module."""
+    """Install a package that consists of one module."""
     name = distribution.replace("-", "_")
     folder.mkdir(exist_ok=True)
     (folder / f"{name}.py").write_text(text)
@@ -46,7 +46,7 @@ def add(folder, distribution, text, **entries):
 
 
 class Site:
-    """A folder of installed packages, and the program that finds them."""
+    """A folder of installed packages, and a way to run the program so that it finds them."""
 
     def __init__(self, folder):
         self.folder, self.packages = folder, folder / "site"
@@ -204,7 +204,7 @@ def test_energy_balances_with_the_normal_force_of_an_extension(site):
 
 
 CUBIC = re.compile(r"```python.(from walkerlab.physics.mechanics.hinges.*?)```", re.DOTALL)
-# the documented cubic spring and three more laws
+# copy of the built-in law, the cubic spring of the docs, and laws with a fault
 HINGES = f"""
 import typing
 {CUBIC.search((ROOT / "docs" / "adding.md").read_text())[1]}
@@ -243,7 +243,9 @@ def halfway(law, angle, rate):
 
 @pytest.fixture(scope="module")
 def hinges(tmp_path_factory):
-    """A package of hinge laws: the built-in one's copy, the cubic spring of the docs, and three with a fault."""
+    """Install a package of hinge laws: a copy of the built-in law, the cubic spring of the docs, and three
+    faulty laws.
+    """
     site = Site(tmp_path_factory.mktemp("hinges"))
     laws = {"copy": "hinge_laws:Linear", "cubic": "hinge_laws:Cubic", "halfway": "hinge_laws:Halfway"}
     laws |= {"apart": "hinge_laws:Apart", "torn": "torn_law:Torn"}
@@ -579,7 +581,9 @@ main()
 
 
 def test_study_runs_from_a_copy_outside_the_package(site):
-    """The evidence uses nothing that other packages cannot use: the same walk is judged the same from outside."""
+    """The evidence uses only what other packages can use, so a copy outside the package gives the same verdict on the
+    same walk.
+    """
     shutil.copytree(
         Path(walkerlab.__file__).parent / "evidence",
         site.packages / "copied",

@@ -1,4 +1,6 @@
-"""Check that an edited function never runs outdated code, because compiled code is stored with its sources' digest."""
+"""Check that outdated compiled code never runs after an edit, because compiled code is stored with a digest of its
+sources.
+"""
 
 import json
 import os
@@ -43,7 +45,7 @@ def once(x: float) -> float:
 
 @pytest.fixture(scope="module")
 def unchanged(tmp_path_factory):
-    """A copy of the package, with the bytecode of what kernels import."""
+    """Return a copy of the package with the bytecode of the modules that kernels import."""
     folder = tmp_path_factory.mktemp("unchanged")
     shutil.copytree(PACKAGE, folder / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))
     environment = {**os.environ, "PYTHONPATH": str(folder)}
@@ -53,7 +55,7 @@ def unchanged(tmp_path_factory):
 
 @pytest.fixture
 def copy(unchanged, tmp_path):
-    """A copy of the package with two files more, and a way to run it in a process of its own."""
+    """Return a copy of the package with two more files, and a way to run it in a fresh process."""
     package = tmp_path / "walkerlab"
     shutil.copytree(unchanged, package)
     (package / "physics" / "orbits" / "trial_of_code.py").write_text(CALLER)
@@ -61,7 +63,7 @@ def copy(unchanged, tmp_path):
 
     def run():
         environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
-        # -B: Python's own cache of bytecode does go by a file's time and size
+        # -B is needed because Python's cache of bytecode goes by the time and size of a file.
         program = [sys.executable, "-B", "-c", CALL]
         done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         value, folder = done.stdout.split()
@@ -80,7 +82,7 @@ def test_editing_an_imported_function_recompiles_its_callers(copy):
     before = called.stat()
     assert run()[0] == 8.0
     called.write_text(CALLED.replace("x + 1.0", "x + 2.0"))
-    # not even a file's time gives it away
+    # Not even the time of the file shows that it was edited.
     os.utime(called, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert run()[0] == 10.0
 
@@ -93,7 +95,8 @@ def test_reinstalled_or_moved_package_reuses_compiled_code(copy, tmp_path):
     assert compiled(tmp_path / "cache") == kept
     moved = tmp_path / "elsewhere"
     moved.mkdir()
-    shutil.copytree(package, moved / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))  # with times of its own
+    # The copy has new times.
+    shutil.copytree(package, moved / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))
     for path in (moved / "walkerlab").rglob("*.py"):
         path.touch()
     environment = {**os.environ, "PYTHONPATH": str(moved), "WALKERLAB_CACHE": str(tmp_path / "cache")}
@@ -156,7 +159,9 @@ def test_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
 
 @pytest.fixture
 def generations(copy, tmp_path):
-    """Make twelve older generations of compiled code, last used so many days ago and earlier; those left of them."""
+    """Return a function that makes twelve older generations of compiled code, the newest last used `days` ago, and
+    returns those that remain after a run.
+    """
     _, run = copy
     host = cache_folder().name.split("-", 4)[4]  # kernels-DIGEST-pyVERSION-numbaVERSION-PROCESSOR
 
@@ -384,7 +389,9 @@ print(trial.twice(3.0), *names, kernel_cache.why_not_built(), sep="|")
 
 @pytest.fixture
 def built(copy, tmp_path):
-    """A copy of the package with the machine code of its trial kernel, and a way to use it with an empty cache."""
+    """Return a copy of the package with the machine code of its trial kernel, and a way to run it with an empty
+    cache.
+    """
     if build_target() is None:
         pytest.skip("no kernels are built for this platform")
     package, _ = copy

@@ -1,4 +1,4 @@
-"""Tests of what compiled functions can do and what they must not do."""
+"""Tests of compiled functions: dispatch by type, records, scratch memory, and stored machine code."""
 
 import importlib
 import os
@@ -29,20 +29,20 @@ from walkerlab.physics.kernels import (
 
 
 class Circle(NamedTuple):
-    """A round thing."""
+    """Shape without corners."""
 
     radius: float
 
 
 class Square(NamedTuple):
-    """A thing with corners."""
+    """Shape with corners."""
 
     side: float
 
 
 @dispatch_by_type
 def area(shape):
-    """Area of a shape."""
+    """Return the area of a shape."""
 
 
 @area.case(Circle)
@@ -66,7 +66,7 @@ def allocating(n):
 
 
 def test_kernels_cannot_allocate_memory():
-    """Code that allocates would count references, which takes as long as its arithmetic."""
+    """Code that allocates memory has to count references, which takes as long as its arithmetic."""
     with pytest.raises(TypingError):
         allocating(3)
     assert uncompiled(allocating)(3) == 0.0
@@ -78,7 +78,7 @@ def test_dispatch_by_type_works_in_python_and_compiled(shape):
 
 
 class Blob(NamedTuple):
-    """A thing without an area."""
+    """Shape for which `area` has no case."""
 
     size: float
 
@@ -94,7 +94,7 @@ def test_type_without_a_case_is_named_in_one_line(call):
 
 @dispatch_by_type_or_default
 def corners(shape):
-    """How many corners a shape has."""
+    """Return the number of corners of a shape."""
     return 0
 
 
@@ -117,7 +117,7 @@ def test_types_without_a_case_use_the_default():
 
 @pass_by_reference
 class Lid(NamedTuple):
-    """A part of a record."""
+    """Record inside another record."""
 
     open: bool
     weights: np.ndarray
@@ -125,7 +125,7 @@ class Lid(NamedTuple):
 
 @pass_by_reference
 class Box(NamedTuple):
-    """A record with arrays and a record in it."""
+    """Record with arrays and another record."""
 
     sides: np.ndarray
     depth: float
@@ -134,7 +134,7 @@ class Box(NamedTuple):
 
 @kernel_part
 def filled(box, share):
-    """Add to the box and return its contents."""
+    """Add `share` to the first side, and return the volume of the box plus the weight on an open lid."""
     box.sides[0] += share
     return box.depth * box.sides[0] * box.sides[1] + (box.lid.weights[-1] if box.lid.open else 0.0)
 
@@ -145,7 +145,7 @@ def filled_twice(box, share):
 
 
 def test_record_passed_by_reference_is_not_copied():
-    """If a new numba breaks this, see `Reference`."""
+    """If a new version of numba breaks this, see `Reference`."""
     for run in (filled_twice, uncompiled(filled_twice)):
         box = Box(np.array([1.0, 2.0]), 3.0, Lid(True, np.array([5.0, 7.0])))
         assert run(box, 1.0) == 6.0 * 2.0 + 7.0 + 6.0 * 4.0 + 7.0
@@ -155,7 +155,7 @@ def test_record_passed_by_reference_is_not_copied():
 
 @kernel_part
 def powers_summed(like, x):
-    """x + x^2 + ..., as many powers as `like` is long, by scratch of its own."""
+    """Return x + x^2 + ..., with as many powers as `like` has elements, computed in scratch memory."""
     powers, products = vector(like), matrix(like)
     for i in range(len(powers)):
         powers[i] = x if i == 0 else powers[i - 1] * x
@@ -170,7 +170,7 @@ def powers_summed(like, x):
 
 @kernel
 def scratch_beside_scratch(like, out):
-    """Fill scratch, and add what a function computes that has scratch of its own."""
+    """Fill scratch memory, and add the result of a function that has other scratch memory."""
     mine = vector(like)
     for i in range(len(mine)):
         mine[i] = i
@@ -181,7 +181,7 @@ def scratch_beside_scratch(like, out):
 
 @pytest.mark.parametrize("like", [(0.0, 0.0, 0.0), np.rec.array([((1.0, 2.0, 3.0),)], dtype=[("n", "f8", (3,))])[0]])
 def test_scratch_arrays_have_the_length_of_their_type_and_are_not_shared(like):
-    """If a new numba breaks this, what kernels compute is wrong: see `_stack_memory`."""
+    """If a new version of numba breaks this, kernels compute wrong results, see `_stack_memory`."""
     function = scratch_beside_scratch if isinstance(like, tuple) else scratch_like_a_field
     for run in (function, uncompiled(function)):
         out = np.zeros(3)
@@ -235,7 +235,7 @@ def outer(x):
 
 @pytest.fixture
 def nested(tmp_path, monkeypatch):
-    """A module with a kernel that calls another one, with nothing compiled."""
+    """Return a module with a kernel that calls another one. Neither is compiled yet."""
     (tmp_path / "nested_kernels.py").write_text(NESTED)
     monkeypatch.setenv("WALKERLAB_CACHE", str(tmp_path / "cache"))
     kernel_cache.cache_folder.cache_clear()
@@ -247,7 +247,7 @@ def nested(tmp_path, monkeypatch):
 
 
 def test_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
-    """Stored machine code cannot be linked."""
+    """This is necessary because stored machine code cannot be linked."""
     names = []
     with watch_compilation(names.append):
         assert nested.outer(1.0) == 4.0
@@ -296,12 +296,12 @@ def test_machine_code_names_records_by_their_layout(monkeypatch):
     two, three = (typeof(np.zeros((), [("numbers", float, (n,))])).dtype for n in (2, 3))
     named = mangle_type(two)
     assert named != mangle_type(three)
-    monkeypatch.setattr(two, "_code", three._code)  # numba's own number, counted up in each process
+    monkeypatch.setattr(two, "_code", three._code)  # Numba gives each type a number, which depends on the process.
     assert mangle_type(two) == named
 
 
 def test_numba_multiplies_matrices_after_kernels_are_loaded():
-    """For whoever calls both: numba looks for the linear algebra that loading kernels leaves out."""
+    """Loading kernels skips linear algebra, which numba then has to find when other code needs it."""
     code = """
 import sys
 import numba, numpy as np

@@ -1,4 +1,4 @@
-"""Check that the notebook of the tutorial runs from its first cell to its last and gives what its text says."""
+"""Check that the notebook of the tutorial runs from top to bottom and gives the results that its text states."""
 
 import json
 from pathlib import Path

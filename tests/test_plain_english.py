@@ -18,7 +18,7 @@ PARTICIPLES = {
     "asked", "begun", "counted", "drawn", "found", "held", "kept", "made", "meant", "met", "said", "shown", "sought",
     "spoken", "taken", "told", "walked", "wanted",
 }  # fmt: skip
-"""Words that say what was done to something, not what it is."""
+"""Participles: they say what was done to something instead of what it is."""
 FRAGMENT = re.compile(
     r"(Of|What|That of|Those|Whom|To whom|By what|It (does|is)\b|Its|None|In which|With what|Nothing|So many|Some|As|At"
     r"|From|Where|Between|Until|Once|If|Such)\b"
@@ -38,7 +38,7 @@ def named(path):
 
 
 def assigned_names(tree):
-    """Names of functions, classes, arguments and variables, with their lines."""
+    """Yield the names of functions, classes, arguments and variables, with their lines."""
     for node in ast.walk(tree):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             yield node.name.strip("_"), node.lineno
@@ -64,7 +64,7 @@ def test_docstrings_do_not_begin_as_fragments():
 
 
 def test_references_in_docstrings_exist():
-    """Files named in docstrings and comments exist, and dotted names in backticks are names of the package."""
+    """Files named in docstrings and comments must exist, and dotted names in backticks must be names of the package."""
     files = {path.name for path in PROJECT.rglob("*.*") if ".git" not in path.parts}
     trees = {path: tree_of(path) for path in SOURCES}
     words = {name for tree in trees.values() for name, _ in assigned_names(tree)} | {path.stem for path in SOURCES}

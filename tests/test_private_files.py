@@ -34,7 +34,7 @@ need_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make fil
 
 
 class Planted:
-    """Leaves a file behind when it is unpickled."""
+    """Object that writes a file when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -44,7 +44,7 @@ class Planted:
 
 
 def as_user(user):
-    """Return arguments that start a process as another user, or none for this user."""
+    """Return arguments that start a process as another user. For this user there are none."""
     return {} if user == os.geteuid() else {"user": user, "group": user, "extra_groups": []}
 
 
@@ -61,7 +61,7 @@ def ordinary():
 
 @pytest.fixture
 def home(ordinary):
-    """A folder of an ordinary user."""
+    """Return a folder that belongs to an ordinary user."""
     folder = Path(tempfile.mkdtemp(prefix="walkerlab-test-"))
     (folder / "three_times.py").write_text(KERNEL)
     os.chown(folder, ordinary, -1)
@@ -70,7 +70,7 @@ def home(ordinary):
 
 
 def call(home, cache, user, umask=0o022, **more):
-    """Call the kernel in a process with its cache in `cache`; return its folder of compiled code, and stderr."""
+    """Call the kernel in a process whose cache is `cache`. Return the folder of compiled code, and stderr."""
     variables = {"WALKERLAB_CACHE": str(cache), "HOME": str(home), "XDG_CACHE_HOME": str(home / "usual"), **more}
     done = subprocess.run(
         [sys.executable, "-B", "-c", CALL, str(home)],

@@ -1,4 +1,4 @@
-"""Check that README's commands are those that CI checks in empty environments."""
+"""Check README, and that CI runs its commands in empty environments."""
 
 import re
 import tomllib

@@ -19,7 +19,7 @@ NO_CACHES = shutil.ignore_patterns("__pycache__")
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A package of its own in each test: its name, and a way to write its files."""
+    """Give each test a new package: its name, and a function that writes its files."""
     name = f"package_{next(NUMBER)}"
     monkeypatch.syspath_prepend(tmp_path)
 
@@ -138,7 +138,7 @@ for name in starts:
 def imported():
     """Return the modules that importing each start loads, in a process that has only third-party libraries."""
     asked = f"{' '.join(LIBRARIES)}\n{' '.join(STARTS)}\n"
-    # a library's threads do not come along
+    # Threads of libraries would not exist in the fork.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-c", IMPORTED], cwd=ROOT, env=environment, input=asked, capture_output=True, text=True
@@ -150,7 +150,7 @@ def imported():
 
 @pytest.mark.parametrize("name", STARTS)
 def test_code_digest_covers_every_module_that_python_imports(name, imported):
-    """The scanner reads text; the interpreter is the independent witness."""
+    """The scanner finds imports in the text. The interpreter checks it independently."""
     assert name in imported[name]
     drawn = {code for extension in extensions().values() for code in extension.drawing_code()}
     added = {code.partition(":")[0] for code in drawn} if name in DRAWINGS else set()

@@ -1,4 +1,4 @@
-"""Check that a request to stop ends the process in order, even while LLVM runs a callback."""
+"""Check that a request to stop ends the process cleanly, even while LLVM runs a callback."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Compare what the whole process of a warm `walkerlab simulate` loads with the minimum."""
+"""Compare the packages that a process of `walkerlab simulate` loads with the minimum."""
 
 import runpy
 import subprocess
@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 SCRIPT = runpy.run_path(str(Path(__file__).parents[1] / "scripts" / "whole_process.py"))
-# what nobody needs who walks from a gait that is there already
+# packages that are not needed for a walk if the gait exists already
 HEAVY = ("scipy.integrate", "scipy.optimize", "matplotlib", "heyoka", "sksundae", "sympy")
 LOADED = "\nimport sys\nprint(*(name for name in {heavy!r} if name in sys.modules), file=sys.stderr)\n"
 

@@ -1,4 +1,4 @@
-"""Tests of workers: they return what they get, failures are reported, and no worker is left."""
+"""Tests of workers: calls return their results, failures are reported, and no worker is left."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ DEADLINE_S = 60.0
 
 
 def until(condition):
-    """Wait for something that will happen."""
+    """Wait until a condition becomes true."""
     deadline = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < deadline

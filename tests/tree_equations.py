@@ -1,6 +1,6 @@
-"""The equations of motion of a tree with all its coordinates, as matrices for checks.
+"""Equations of motion of a tree in all coordinates, as matrices for checks.
 
-What is integrated has the root's motion solved for; this routine has not, and runs in plain NumPy.
+The integrated equations eliminate the motion of the root. These do not, and they are plain NumPy.
 """
 
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ Floats = NDArray[np.float64]
 
 
 class EquationsOfMotion(NamedTuple):
-    """M ddq + bias + weight = generalised forces, for q = (theta_1 .. theta_n, x, y) of the root."""
+    """Terms of M ddq + bias + weight = generalised forces, for q = (theta_1 .. theta_n, x, y of the root)."""
 
     mass_matrix: Floats  # (n + 2, n + 2) M; kg m^2, kg m, kg
-    bias: Floats  # (n + 2,) what the velocities alone ask for, C dq; N m, N
+    bias: Floats  # (n + 2,) velocity terms C dq; N m, N
     weight: Floats  # (n + 2,) derivatives of the potential energy, G; N m, N
 
 
 def mass_matrix_and_bias(
     assembly: Assembly, root: Anchor | None, angles: Sequence[float], velocities: Sequence[float], gravity: float
 ) -> EquationsOfMotion:
-    """The matrices of an assembly's equations of motion at one state, gravity towards -y.
+    """Return the terms of the equations of motion of an assembly in one state. Gravity acts towards -y.
 
     root        the material point whose x and y are coordinates; None is the centre of mass
     angles      (n,) absolute angles of the bodies, rad

@@ -1,4 +1,4 @@
-"""Random walkers whose legs differ, as plain descriptions and as models of the package."""
+"""Random walkers whose legs differ, as plain descriptions and as rigid models of the package."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def varied(draw, leg, share):
 def draw_walker(kind, seed):
     draw = np.random.default_rng(seed)
     knees = Leg((Segment(0.5, 0.5, 0.325, 0.0, 0.0), Segment(0.5, 0.05, 0.125, 0.0, 0.0)), 0.0)
-    if kind == "one knee":  # Miandoab and Beigzadeh's
+    if kind == "one knee":  # walker of Miandoab and Beigzadeh
         kneed = Leg((Segment(0.379, 8.76, 0.143, 0.0, 0.129), Segment(0.388, 2.70, 0.157, 0.0, 0.032)), 0.0)
         straight = Leg((Segment(0.767, 11.46, 0.235, 0.0, 0.479),), 0.0)
         legs, hip, slope = (varied(draw, kneed, 2e-3), varied(draw, straight, 2e-3)), 37.08, 0.04

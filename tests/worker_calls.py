@@ -1,4 +1,4 @@
-"""Functions that tests let workers call."""
+"""Functions that workers call in tests."""
 
 import atexit
 import os
@@ -24,7 +24,7 @@ def sleep():
 
 def begun_at():
     begun = time.monotonic()
-    time.sleep(1.0)  # longer than one worker takes to start after another
+    time.sleep(1.0)  # This is longer than the time between the starts of two workers.
     return begun
 
 
@@ -50,7 +50,7 @@ def numbers(number=0):
 
 
 def once_a_file_has(path, text, patience_s=60.0):
-    """Return 1 once a file holds a text, 0 if it does not come."""
+    """Return 1 as soon as a file contains a text, or 0 if it does not appear in time."""
     deadline = time.monotonic() + patience_s
     while time.monotonic() < deadline:
         if path.exists() and text in path.read_bytes():

@@ -26,7 +26,7 @@ def test_built_in_configs_are_listed() -> None:
 
 @pytest.mark.skipif(not REPOSITORY.is_dir(), reason="the repository's configs/ are not beside the tests")
 def test_built_in_configs_equal_those_of_the_repository() -> None:
-    """In a checkout they are one folder; an installed package has its texts."""
+    """In a checkout they are the same files. An installed package has copies."""
     here, installed = (
         {path.relative_to(folder): path.read_text(encoding="utf-8") for path in folder.rglob("*.yaml")}
         for folder in (REPOSITORY, BUILTIN_FOLDER)

@@ -1,4 +1,4 @@
-"""Tests of the part of a config that each stage gets, and of the key made from it."""
+"""Tests of the slice of a config that each stage reads, and of the key computed from it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class ToleranceConfig(Protocol):
 
 
 class ToleranceThenStart(StartConfig, ToleranceConfig, Protocol):
-    """A type whose bases are listed in the opposite order of their keys."""
+    """A type that lists its bases in the opposite order of their keys."""
 
 
 class StartThenTolerance(ToleranceConfig, StartConfig, Protocol):
@@ -63,7 +63,7 @@ class MisspeltConfig(Protocol):
 
 @pytest.fixture
 def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Let `reads` import the blocks of the config at run time, and not for mypy alone."""
+    """Let `reads` import the blocks of the config at run time, as some stages do, instead of only for mypy."""
     blocks = (Basin, Case, Contact, Continuation, Design, Footholds, Identify, PushOff, Robustness)
     for block in blocks:
         monkeypatch.setattr(reads, block.__name__, block, raising=False)
@@ -103,7 +103,7 @@ def test_slice_does_not_depend_on_the_order_of_keys() -> None:
     assert canonical_json(one) == canonical_json(other)
 
 
-def test_slice_without_a_type_is_the_whole_config() -> None:
+def test_stage_without_a_config_type_gets_the_whole_config() -> None:
     assert slice_of(CONFIG, None) == CONFIG.model_dump(mode="json")
     assert restrict(CONFIG, None) is CONFIG
 

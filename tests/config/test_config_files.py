@@ -102,7 +102,7 @@ def test_huge_file_is_rejected_without_reading_it(tmp_path: Path) -> None:
         load(path)
     most_bytes = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert most_bytes < 100 * MAX_CHARACTERS  # of the file's 2^40
+    assert most_bytes < 100 * MAX_CHARACTERS  # the file has 2^40 bytes
 
 
 def test_byte_order_mark_is_ignored(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tests of precedence: a file over the config that it extends, and `--set` and `--strides` over both."""
+"""Tests of precedence: a file overrides the config that it extends, and `--set` and `--strides` override both."""
 
 import math
 import re

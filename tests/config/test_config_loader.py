@@ -64,7 +64,7 @@ print(*sorted(loaded - set(sys.stdlib_module_names)))
 
 
 def packages_loaded_by(statements: str) -> set[str]:
-    """Return the packages beyond the standard library that some statements import in a process of their own."""
+    """Return the packages outside the standard library that some statements import, run in a fresh process."""
     command = [sys.executable, "-c", PACKAGES_LOADED.format(statements)]
     return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split())
 
@@ -143,7 +143,7 @@ def test_dependent_start_values_and_rates_are_adjusted_with_a_warning(loaded: Lo
 def test_swing_knee_is_straightened_at_the_start_with_a_warning(loaded: Loaded, refused: Refused) -> None:
     result = loaded("extends: kneed\nstart: [null, 0.19, -0.285, -0.05, -1.1, -0.3]\n")
     assert result.config.start[2] == result.config.start[0]
-    assert result.config.start[5] == -0.3  # the knee is free
+    assert result.config.start[5] == -0.3  # The knee may bend at mid-step, so its rate stays as stated.
     assert "theta_1_shank moved from -0.285" in result.warnings[-1]
     assert "theta_1_shank is -0.4 but must be" in refused(
         "extends: kneed\nstart: [null, 0.19, -0.4, -0.05, -1.1, -0.3]\n"

@@ -1,4 +1,4 @@
-"""Tests of reading YAML: YAML 1.2 scalars, positions in the text, and texts that are no config."""
+"""Tests of reading YAML: YAML 1.2 scalars, positions in the text, and texts that are not a config."""
 
 import math
 from typing import Any

@@ -60,7 +60,7 @@ def test_table_lists_each_key_once() -> None:
     assert {line.count("|") for line in table} == {table[0].count("|")}
     listed = [line.split(" | ")[0].removeprefix("| ") for line in table[2:]]
     assert len(set(listed)) == len(listed)
-    # torso, hip and knee are the same for every type of walker
+    # The keys of torso, hip and knee are the same for every type of walker, so they have one row.
     assert [row.key for row in keys() if not {row.key, "walker" + row.key.partition(")")[2]} & set(listed)] == []
 
 

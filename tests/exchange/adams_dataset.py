@@ -24,7 +24,7 @@ LENGTHS_M = {"METER": 1.0, "MILLIMETER": 1e-3, "CENTIMETER": 1e-2, "INCH": 0.025
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement of a dataset: its name, id, flags, and arguments by name."""
+    """Statement of a dataset: name, id, flags, and arguments by name."""
 
     name: str
     id: int
@@ -40,14 +40,14 @@ class Statement:
 
 
 def number(text: str) -> float:
-    """A number as ADAMS writes it; a D behind it means degrees."""
+    """Parse a number as ADAMS writes it. A trailing D means degrees, which become radians."""
     text = text.strip()
     assert NUMBER.match(text), f"not a number: {text!r}"
     return math.radians(float(text[:-1])) if text.endswith("D") else float(text)
 
 
 def logical_lines(text: str):
-    """Statements as single lines, each with the name that Adams View gives its object."""
+    """Yield each statement as a single line, with the name that Adams View gives to the object."""
     title, *lines = text.splitlines()
     assert "/" not in title, "the first line is a title and must not look like a statement"
     label, current = "", None
@@ -73,7 +73,7 @@ def logical_lines(text: str):
 
 
 def split_arguments(text: str) -> list[str]:
-    """Split at commas outside parentheses and quotes; an expression ends at a backslash or the end."""
+    """Split at commas outside parentheses and quotes. An expression ends at a backslash or at the end of the text."""
     pieces, depth, quoted, start = [], 0, False, 0
     for i, character in enumerate(text):
         if character == '"':
@@ -137,13 +137,13 @@ class Part:
     mass: float
     inertia: float
     centre: np.ndarray  # (2,) in the part's frame
-    start: np.ndarray  # x, y, angle
-    velocity: np.ndarray  # of the centre of mass, and angular
+    start: np.ndarray  # x, y and angle at the start
+    velocity: np.ndarray  # velocity of the centre of mass, and angular velocity
     label: str = ""
 
 
 def turn_of(reuler: tuple[float, ...]) -> float:
-    """Rotation about z from body-fixed 3-1-3 angles that keep z, or turn it twice by pi."""
+    """Return the rotation about z for body-fixed 3-1-3 angles that keep z, or turn it twice by pi."""
     a, b, c = reuler or (0.0, 0.0, 0.0)
     assert abs(math.sin(b)) < 1e-12, "planar models turn about z alone"
     return a + math.cos(b) * c
@@ -178,7 +178,7 @@ FUNCTIONS = {
 
 
 def compile_expression(text: str):
-    """Compile an expression of ADAMS to Python's code; IF(e: a, b, c) evaluates only what is chosen."""
+    """Compile an expression of ADAMS to Python code. IF(e: a, b, c) evaluates only the chosen branch."""
     text = text.upper()
     assert "--" not in text.replace(" ", ""), f"two minus signs in a row: {text}"
 
@@ -211,18 +211,19 @@ def zero(*markers: int) -> float:
 
 
 class Motion:
-    """Positions and velocities of a dataset's parts and markers at one state, each computed once."""
+    """Positions and velocities of parts and markers of a dataset in one state. Each is computed once."""
 
     def __init__(self, dataset, q, u) -> None:
         self.dataset, self.known = dataset, {}
-        self.frames = {dataset.ground: (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)}  # place, angle, cos, sin, rates
+        # position, angle, its cosine and sine, rates
+        self.frames = {dataset.ground: (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)}
         q, u = q.tolist(), u.tolist()
         for part, i in dataset.index.items():
             x, y, turn = q[i : i + 3]
             self.frames[part] = (x, y, turn, math.cos(turn), math.sin(turn), *u[i : i + 3])
 
     def of(self, marker):
-        """Place, angle, velocity and spin of a marker, and its lever from its part's origin."""
+        """Return position, angle, velocity and angular velocity of a marker, and its lever from the part's origin."""
         if (known := self.known.get(marker)) is None:
             m = self.dataset.markers[marker]
             x, y, turn, cos, sin, vx, vy, spin = self.frames[m.part]
@@ -233,7 +234,7 @@ class Motion:
         return known
 
     def centres(self):
-        """Levers of the parts' centres of mass."""
+        """Return the levers from the origins of parts to their centres of mass."""
         for identity, part in self.dataset.parts.items():
             (ahead, up), cos, sin = part.centre.tolist(), *self.frames[identity][3:5]
             yield cos * ahead - sin * up, sin * ahead + cos * up
@@ -241,7 +242,7 @@ class Motion:
     def seen(self, first, i, j, k):
         """Return the vector from J to I in the frame of K, from positions or velocities.
 
-        An omitted marker is the ground's.
+        If J or K is omitted, it is the ground's.
         """
         x, y = self.of(i)[first : first + 2]
         if j:
@@ -276,7 +277,7 @@ class Motion:
 
 
 class Sensor:
-    """A SENSOR that waits until its expression is no longer below its value."""
+    """A SENSOR that triggers when its expression is no longer below its value."""
 
     def __init__(self, statement: Statement) -> None:
         assert "GE" in statement.flags
@@ -292,7 +293,7 @@ class HaltError(Exception):
 
 @dataclass
 class Dataset:
-    """A planar model of ADAMS in its own units (lengths, kg, s), as its text defines it."""
+    """A planar model of ADAMS as its text defines it, in the units of the dataset (lengths, kg, s)."""
 
     text: str
     statements: list[Statement] = field(init=False)
@@ -398,7 +399,7 @@ class Dataset:
         return np.diag(np.concatenate(diagonal))
 
     def mass(self, q):
-        """Mass matrix by the parts' coordinates."""
+        """Return the mass matrix in the coordinates of the parts."""
         out = self.mass_upright.copy()
         for (identity, part), (x, y) in zip(self.parts.items(), Motion(self, q, q).centres(), strict=True):
             i = self.index[identity]
@@ -407,7 +408,7 @@ class Dataset:
         return out
 
     def applied(self, t, q, u):
-        """Generalised forces of gravity, of expressions and of the centripetal terms."""
+        """Return the generalised forces of gravity, of force expressions and of centripetal terms."""
         motion, out = Motion(self, q, u), [0.0] * len(q)
         environment = self.environment(t, motion)
         gx, gy = self.gravity.tolist()
@@ -416,12 +417,12 @@ class Dataset:
             fx, fy = part.mass * (gx + spin**2 * x), part.mass * (gy + spin**2 * y)
             out[i], out[i + 1], out[i + 2] = fx, fy, x * fy - y * fx
         for (marker, frame, expressions), reaction in zip(self.forces, self.reactions, strict=True):
-            # a newton is a kilogram times `metre` lengths of the dataset per second squared
+            # A newton is a kilogram times `metre` lengths of the dataset per second squared.
             fx, fy, tz = (self.metre * eval(expression, environment) for expression in expressions)
             turn = motion.of(frame)[2]
             along, upward = math.cos(turn) * fx - math.sin(turn) * fy, math.sin(turn) * fx + math.cos(turn) * fy
             self._apply(out, motion, marker, along, upward, tz)
-            # a floating marker stands where I is, on the part that takes the reaction
+            # A floating marker is at I, on the part that takes the reaction.
             assert self.markers[reaction].floating
             assert self.markers[reaction].part == self.ground
         for statement, expression in self.single:
@@ -470,7 +471,7 @@ class Dataset:
         return pins, np.array(rows).reshape(len(rows), width)
 
     def constraints(self, q, u):
-        """Rows of the constraints' Jacobian, and minus their derivative times the rates."""
+        """Return the rows of the Jacobian of the constraints, and minus their derivative times the rates."""
         motion, (pins, steady) = Motion(self, q, u), self.joints
         held = [row for identity, row in self.motions.items() if ("MOTION", identity) not in self.inactive]
         steady = np.vstack((steady, *held))
@@ -496,7 +497,7 @@ class Dataset:
         q, u = y[: y.size // 2], y[y.size // 2 :]
         g, bias = self.constraints(q, u)
         n, m = len(q), len(g)
-        # lengths are not metres: both blocks are brought to like sizes before they are solved
+        # Lengths may be in millimetres. Scale both blocks to similar sizes before solving.
         near = 1.0 / np.sqrt(self.mass_upright.diagonal())
         scale = np.concatenate([near, 1.0 / np.sqrt(((g * near) ** 2).sum(axis=1))])
         matrix = np.zeros((n + m, n + m))
@@ -509,7 +510,7 @@ class Dataset:
         return 3 * len(self.parts) - len(self.constraints(*self.start)[0])
 
     def run(self, commands: str, rtol=1e-9, atol=1e-9, method="LSODA") -> list[tuple[str, float]]:
-        """Run a command file (.acf) from the initial conditions; return the sensors that ended simulations, and when.
+        """Run a command file (.acf) from the initial conditions. Return the sensors that ended simulations, and when.
 
         Raises HaltError if a sensor halts the run.
         """
@@ -528,7 +529,7 @@ class Dataset:
         return triggered
 
     def simulate(self, t, y, end_s, how):
-        """Integrate until a sensor triggers; return it, or None at the end, with time and state."""
+        """Integrate until a sensor triggers or until the end. Return the sensor, or None, with time and state."""
         active = [sensor for identity, sensor in self.sensors.items() if ("SENSOR", identity) not in self.inactive]
         rtol, atol, method = how
 
@@ -552,7 +553,7 @@ class Dataset:
         return (true[0] if true else None), t, y
 
     def integrate(self, end_s: float, rtol=1e-10, atol=1e-10, events=(), method="Radau", first_step=1e-6):
-        """Integrate from the initial conditions; `events` are functions of (t, q, u)."""
+        """Integrate from the initial conditions. `events` are functions of (t, q, u)."""
         wrapped = []
         for event in events:
 

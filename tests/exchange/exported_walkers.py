@@ -16,7 +16,7 @@ PADS = "contact.terrain=checkerboard"
 
 @cache
 def with_gait(name, *sets):
-    """Config, and the start of its rigid gait."""
+    """Return the config with the start of its rigid gait."""
     config = load(Path(name), sets).config
     gait = run_in_memory("fixedpoint", config).summary
     return config, GaitStart(gait["step_length_m"], gait["state"], gait["asymmetry"]["step_length"])
@@ -41,7 +41,7 @@ LIMPING = (
         "walker.knee.damping_N_m_s_per_rad=0.004", "strides=1",
     ),
 )  # fmt: skip
-"""Walkers whose legs differ: one of each kind."""
+"""One walker of each kind with legs that differ."""
 ONE_KNEE = (
     "one-knee", "strides=1",
     "contact={stiffness: 300000, damping: 270, terrain: checkerboard, stiction_velocity: 10, friction_velocity: 100}",
@@ -69,7 +69,7 @@ contact: {terrain: checkerboard}
 
 
 def random_walker(seed):
-    """Name and settings of a walker drawn at random, one of each kind in turn, on pads of its own step length."""
+    """Return name and settings of a random walker on pads at its step length. The kinds take turns."""
     draw = np.random.default_rng(seed)
 
     def about(key, value):
@@ -91,7 +91,7 @@ def random_walker(seed):
 
 
 def random_kneed_walker(seed, strides):
-    """Name and settings of a kneed walker drawn at random, one of each kind in turn."""
+    """Return name and settings of a random kneed walker. The kinds take turns."""
     draw = np.random.default_rng(seed)
 
     def about(key, value, spread=0.03):
@@ -109,7 +109,7 @@ def random_kneed_walker(seed, strides):
 
 
 def run_kneed(name, *sets):
-    """Run the ADAMS files of a kneed walker; return times of touches and of locks, and our walk."""
+    """Run the ADAMS files of a kneed walker. Return the times of touches and of locks, and our walk."""
     dataset, commands = files_of("adm", "functions", name, *sets).files.values()
     config, start = with_gait(name, *sets)
     events = Dataset(dataset).run(commands)
@@ -120,8 +120,8 @@ def run_kneed(name, *sets):
 
 
 def touches_of(dataset, export, count):
-    """Return the times at which feet touch ahead of each other, integrating the model from its initial conditions as
-    written.
+    """Integrate the model from the initial conditions in its text. Return the times at which a foot touches ahead of
+    the other.
     """
     names = export.names[export.hip_link], export.names[0]
     parts = [next(k for k, part in dataset.parts.items() if part.label == name) for name in names]
@@ -146,5 +146,5 @@ def touches_of(dataset, export, count):
             if ahead[0] > 0.25 * 1000.0 * export.scene.ground.terrain.pitch and time > 0.1:
                 times.append((time, foot))
     times.sort()
-    # a leading foot that bounces touches again before the other one's turn
+    # A leading foot that bounces touches again before it is the turn of the other foot.
     return np.array([time for k, (time, foot) in enumerate(times) if k == 0 or times[k - 1][1] != foot])

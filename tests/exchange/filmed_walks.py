@@ -1,4 +1,4 @@
-"""Recordings of the built-in compass's walk by films, sensors and markers."""
+"""Recordings of a walk of the built-in compass by films, sensors and markers."""
 
 import functools
 import math
@@ -16,7 +16,7 @@ LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
 
 @functools.cache
 def splines():
-    """The paper's walk: a spline through the leg angles of each step."""
+    """Return the walk of the paper's compass as a spline through the leg angles of each step."""
     trajectory = walkerlab.simulate(strides=4).content["trajectory"]
     pieces = []
     for step in range(8):
@@ -27,7 +27,7 @@ def splines():
 
 
 def angles_at(time):
-    """Leg angles (samples, 2) of the paper's walk, whose first heel strike is at time 0."""
+    """Return the leg angles (samples, 2) of the same walk, with the first heel strike at time 0."""
     angle = np.empty((time.size, 2))
     for instants, spline in splines():
         rows = (time >= instants[0]) & (time <= instants[-1])
@@ -54,7 +54,9 @@ def all_steps_are_right(summary, period=1e-5, length=1e-5):
 
 
 def places_of(angle, belt_m_s=0.0, fps=100.0):
-    """Places (samples, marker, axis) of hip and feet in m, x along the slope, y up, z sideways; the hip sways."""
+    """Return positions (samples, marker, axis) of hip and feet in m: x along the slope, y up, z sideways. The hip
+    sways.
+    """
     time = np.arange(len(angle)) / fps
     stride = np.arange(len(angle)) / fps / PERIOD_S
     from_hip = np.stack([np.sin(angle), -np.cos(angle), np.broadcast_to([0.1, -0.1], angle.shape)], axis=2)

@@ -1,4 +1,4 @@
-"""Test the tests' own reader of ADAMS datasets on motions known from elsewhere."""
+"""Check the reader of ADAMS datasets that other tests use, on motions known from elsewhere."""
 
 import math
 
@@ -13,7 +13,8 @@ HEAD = (
 )
 TAIL = "ACCGRAV/\n, IGRAV = 0\n, JGRAV = {}\n, KGRAV = 0\nEND\n"
 
-# projectchrono/chrono, data/testing/joints: Revolute_Case01 as computed by ADAMS, turned from the x-z to the x-y plane
+# Revolute_Case01 as computed by ADAMS, rotated from the x-z to the x-y plane (projectchrono/chrono,
+# data/testing/joints).
 CHRONO = {1.0: (-0.892381, -1.78988), 2.0: (-1.95112, -0.439479), 4.0: (1.29696, -1.52246), 5.0: (-1.99968, -0.0355587)}
 PENDULUM = """PART/2
 , MASS = 1
@@ -100,14 +101,14 @@ def test_linear_contact_lasts_half_an_oscillation():
 
 
 def test_ball_rests_where_the_force_equals_its_weight():
-    # k d^2.2 = m g, in millimetres
+    # from k d^2.2 = m g, in millimetres
     text = HEAD.format("MILLIMETER") + BALL.format(
         height=1.0 - (2.0 * 9.80665 / 1e5) ** (1 / 2.2), speed=0.0,
         force="IMPACT(DY(21,1,1), VY(21,1,1,1), 1.0, 1.0E5, 2.2, 90, 0.1)",
     ) + TAIL.format(-9806.65)  # fmt: skip
     dataset = Dataset(text)
     q, u = dataset.start
-    # newtons move millimetres: a force in N accelerates a kilogram by 1000 mm/s^2
+    # In millimetres, a newton accelerates a kilogram by 1000 mm/s^2.
     assert dataset.rate(0.0, np.concatenate([q, u]))[4] == pytest.approx(0.0, abs=1e-6)
 
 

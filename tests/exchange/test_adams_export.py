@@ -1,4 +1,4 @@
-"""Check that exported ADAMS models, rebuilt from their text, have our walker's masses, forces and walk."""
+"""Check that ADAMS models rebuilt from the exported text have the masses, forces and walk of our walker."""
 
 import re
 
@@ -34,7 +34,9 @@ def dataset_of(law, name, *sets):
 
 
 def hung(dataset, q, v):
-    """Coordinates and velocities of all parts from those of a tree: place of the base (m), then relative angles."""
+    """Return coordinates and velocities of all parts, given those of a tree: position of the base (m), then relative
+    angles.
+    """
     pose, rates = np.zeros(3 * len(dataset.parts)), np.zeros(3 * len(dataset.parts))
     number = 2
     for joint in dataset.of("JOINT"):
@@ -58,12 +60,14 @@ def without_forces(dataset):
 
 
 def directions(dataset, q):
-    """Return (velocities of parts, velocities of the tree): how the parts move as the tree does."""
+    """Return the matrix that maps the velocities of the tree to those of the parts, (velocities of parts, velocities of
+    the tree).
+    """
     return np.column_stack([hung(dataset, q, unit)[1] for unit in np.eye(q.size)])
 
 
 def mass_of_tree(scene, q):
-    """Our mass matrix in the tree's coordinates, from the constants of the equations of motion."""
+    """Return our mass matrix in the coordinates of the tree, from the constants of the equations of motion."""
     whole, chain = scene.ours.whole, scene.model.chain
     n = len(chain)
     columns = np.column_stack([np.array(scene.about_centre(q, unit))[2 + n :] for unit in np.eye(q.size)])
@@ -76,7 +80,7 @@ def mass_of_tree(scene, q):
 
 
 def random_states(export, count=5):
-    """States about the start with both feet some millimetres inside their pads."""
+    """Yield random states near the start with both feet some millimetres inside their pads."""
     draw = np.random.default_rng(1)
     q, v = export.start
     for _ in range(count):
@@ -108,7 +112,7 @@ def test_exported_forces_equal_the_models(seed, law):
     walker = (*random_walker(seed), law)
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     without = without_forces(dataset_of("functions", *walker))
-    # the other foot has just touched: its leg stands, and the trailing foot is pushed
+    # The other foot has just touched, so its leg is the stance leg and the trailing foot is pushed.
     touch = export.touches_s[0]
     time = touch + 0.3 * export.config.push_off.duration_s
     system = place_on_ground(export.scene.walker, (True, True), progress=new_progress(0, 1, touch))
@@ -119,7 +123,7 @@ def test_exported_forces_equal_the_models(seed, law):
         state = hung(dataset, q, v)
         theirs = dataset.applied(time, *state) - without.applied(time, *state)
         theirs = directions(dataset, q).T @ theirs / MM**2
-        # a penetration is the difference of heights of a metre, each rounded
+        # A penetration is the difference of two rounded heights of a metre.
         rounding = 4.0 * np.finfo(float).eps * 2.2 / np.abs(feet[:, 1]).min()
         assert np.abs(theirs - ours).max() < (1e-12 + rounding) * np.abs(ours).max()
 
@@ -135,7 +139,7 @@ def test_exported_model_reproduces_the_walk(seed):
 
 @pytest.mark.parametrize("walker", LIMPING[:3], ids=lambda walker: walker[0])
 def test_exported_model_of_legs_that_differ_reproduces_the_walk(walker):
-    """The fourth kind has knees and is tested below."""
+    """The fourth kind has knees, and another test covers it."""
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     assert export.walk.steps == 4
     expected = np.array(export.touches_s[:3])
@@ -143,7 +147,7 @@ def test_exported_model_of_legs_that_differ_reproduces_the_walk(walker):
 
 
 def test_pads_of_legs_that_differ_lie_under_their_footholds():
-    """Leg 1 lands ahead of leg 2 by its own step, which is longer than that of leg 2."""
+    """Leg 1 takes longer steps than leg 2."""
     dataset, export = dataset_of("contact", *LIMPING[0]), export_of(*LIMPING[0])
     pitch = export.scene.ground.terrain.pitch
     boxes = [s for s in dataset.of("GRAPHICS") if "BOX" in s.flags]
@@ -311,7 +315,7 @@ def test_uneven_pads_are_exported_as_boxes():
     sets = ("ground.heights_m=[0.001,-0.002]", "strides=2")
     dataset = dataset_of("contact", "paper", *sets)
     tops = {s.label: s.numbers("QP")[1] + 50.0 for s in dataset.of("MARKER") if s.label.startswith("pad_")}
-    # pads are numbered from two behind the start's
+    # The first pad is two pads behind that of the start.
     assert [tops[f"pad_{number}"] for number in range(1, 7)] == pytest.approx([0.0, 0.0, 0.0, 1.0, -2.0, -2.0])
 
 

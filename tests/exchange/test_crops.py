@@ -1,4 +1,6 @@
-"""Check heel strikes of cut recordings against their stated errors: a sample of scripts/crop_campaign.py."""
+"""Check that heel strikes of cropped recordings are within their stated errors, on a few cases of
+scripts/crop_campaign.py.
+"""
 
 import importlib.util
 from pathlib import Path
@@ -24,7 +26,7 @@ def test_no_strike_of_a_cropped_recording_is_missed_invented_or_far_off(tmp_path
 
 
 def test_error_bar_of_a_strike_just_after_the_start_holds(tmp_path):
-    """The few samples before the strike once distorted the fit of the samples after it."""
+    """The few samples before the strike must not distort the fit of those after it."""
     crops = campaign()
     for crop in (crops.Crop(1.39467, 4.218, 240.0, 1.75e-3, -1.0), crops.Crop(0.69340, 3.98, 25.0, 1.75e-4, -1.0)):
         counts = [crops.count_strikes(crop, np.random.default_rng(seed), tmp_path) for seed in range(6)]
@@ -32,7 +34,7 @@ def test_error_bar_of_a_strike_just_after_the_start_holds(tmp_path):
 
 
 def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
-    """The sample changed sides in each fit, so that the strike never came to rest."""
+    """If the sample changed sides in each fit, the strike would never converge."""
     crops = campaign()
     crop = crops.Crop(0.62168034, 4.26921954, 25.0, 1.75e-4, -1.0)
     counts = [crops.count_strikes(crop, np.random.default_rng(seed), tmp_path) for seed in range(8)]
@@ -41,17 +43,19 @@ def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
 
 
 def test_error_bar_of_a_strike_just_before_the_start_contains_its_distance(tmp_path):
-    """The strike was 9 ms before the first sample, at which it was found within 1.6 ms."""
+    """The strike is 9 ms before the first sample. If it is found at that sample, its error bar must reach back that
+    far.
+    """
     crops = campaign()
     crop = crops.Crop(1.416340339244594, 4.3245826090380675, 30.0, 1.7453e-3, -1.0)
-    # In these films, three of 300, the first sample counts as a strike.
+    # In these three films of 300 the first sample counts as a strike.
     errors = [crops.count_strikes(crop, np.random.default_rng(seed), tmp_path).errors for seed in (227, 235, 280)]
     assert [len(each) for each in errors] == [5, 5, 5]
     assert max(each[0] for each in errors) < 3.0
 
 
 def test_slow_film_without_noise_is_not_cut_at_a_strike(tmp_path):
-    """The polynomials' error, with the strike elsewhere, passed for a sensor that slipped."""
+    """With the strike elsewhere, the error of the polynomials looks like a sensor that slips."""
     crops = campaign()
     crop = crops.Crop(1.4243780296881074, 4.93539416202693, 25.0, 0.0, -1.0)
     count = crops.count_strikes(crop, np.random.default_rng(0), tmp_path)

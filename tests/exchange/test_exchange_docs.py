@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("name", ["paper.adm", "paper.acf", "paper.cmd", "paper.xml"])
 def test_downloads_equal_freshly_exported_models(folder, name):
-    """They are equal up to rounding, except for the line with the version."""
+    """The files are equal up to rounding, except for the line with the version."""
     texts = [
         re.sub(r".*Written by walkerlab.*", "", path.read_text()) for path in (DOCS / "downloads" / name, folder / name)
     ]

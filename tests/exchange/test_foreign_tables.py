@@ -1,4 +1,4 @@
-"""Read tables as spreadsheets, tracking programs and other countries write them."""
+"""Read tables in the forms in which spreadsheets, tracking programs and other countries write them."""
 
 import codecs
 import os
@@ -22,7 +22,7 @@ LINES = {"angle 1": "HIP>F1", "angle 2": "HIP>F2"}
 
 
 def table(rows=ROWS, header=HEADER, delimiter=",", above=(), below=()):
-    """A table with lines above and below its header."""
+    """Return a table with some lines above and below its header."""
     lines = (delimiter.join(cells) for cells in (header, *below, *rows))
     return "\n".join([*above, *lines]) + "\n"
 
@@ -49,14 +49,14 @@ def holds_the_walk(walk, part=slice(None)):
 
 
 def positions():
-    """Positions (samples, 9) of a hip and two feet, mm, y upwards, the hip moving along x."""
+    """Return positions (samples, 9) of a hip and two feet in mm. The y axis points up, and the hip moves along x."""
     hip = np.stack([100.0 * TIMES, np.full_like(TIMES, 900.0), np.zeros_like(TIMES)], axis=1)
     feet = [hip + 900.0 * np.stack([np.sin(a), -np.cos(a), 0.0 * a], axis=1) for a in ANGLES.T]
     return np.hstack([hip, *feet])
 
 
 def trc(names=("HIP", "F1", "F2"), values=None, count=None, units="mm", comma=False):
-    """A .trc file; `count` is what its header states as the number of markers."""
+    """Return a .trc file whose header states `count` as the number of markers."""
     values = positions() if values is None else values
     texts = [[f"{number:.7f}".replace("nan", "") for number in row] for row in np.column_stack((TIMES, values))]
     axes = "\t".join(f"X{n}\tY{n}\tZ{n}" for n in range(1, len(names) + 1))
@@ -351,14 +351,14 @@ def test_motion_file_angles_default_to_the_unit_opensim_assumes(name, settings, 
 
 
 def test_motion_file_without_version_and_degrees_needs_a_unit(tmp_path):
-    """OpenSim reads it in degrees, whatever it says."""
+    """OpenSim reads such a file in degrees, whatever its header says."""
     text = opensim(settings="inDegrees=no\n")
     with pytest.raises(ConfigError, match="states no unit for 'angle_1'"):
         read(tmp_path, "walk.mot", text)
     assert holds_the_walk(read(tmp_path, "walk.mot", text, units={"angle": "rad"}))
 
 
-# Programs that need another export
+# Files of programs that need another kind of export
 
 
 @pytest.mark.parametrize(
@@ -418,7 +418,7 @@ def test_angles_in_milliradians_are_read(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.csv", table(rows, ("time (s)", "angle 1 (mrad)", "angle 2 (mrad)"))))
 
 
-# Encodings, and files that are none
+# Encodings, and paths that are not files
 
 
 RES = (
@@ -441,7 +441,9 @@ BLOCKS = (
     ],
 )  # fmt: skip
 def test_results_of_adams_are_read_in_any_encoding(declared, encoding, tmp_path):
-    """The state at time 0 is among the initial conditions: the first dynamic step is at the first output time."""
+    """The file has the state at time 0 only among the initial conditions. The first dynamic step is at the first output
+    time.
+    """
     assert codecs.lookup(encoding)
     assert holds_the_walk(read(tmp_path, "walk.res", RES.format(declared, BLOCKS), encoding=encoding))
 

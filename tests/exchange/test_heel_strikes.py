@@ -1,4 +1,4 @@
-"""Find heel strikes in recordings that are cut anywhere, noisy, or have swapped, rotated or biased angles."""
+"""Find heel strikes in recordings that begin or end anywhere, are noisy, or have swapped, rotated or biased angles."""
 
 import functools
 import math
@@ -43,7 +43,7 @@ def test_recording_that_starts_after_a_heel_strike_begins_at_the_next_one(cut_ms
 @pytest.mark.parametrize("fps", [60.0, 100.0, 240.0])
 @pytest.mark.parametrize("cut_ms", [10, 15, 20, 25])
 def test_noise_does_not_make_the_first_sample_a_heel_strike(cut_ms, fps, tmp_path):
-    """A hundredth of the angles as noise locates a heel strike to about a millisecond."""
+    """With noise of a hundredth of the angles, a heel strike is located to about a millisecond."""
     for seed in range(3):
         summary = read(tmp_path, *sampled(begin=1e-3 * cut_ms, fps=fps, noise=1e-3, seed=seed))
         assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=4e-3)
@@ -114,7 +114,7 @@ def test_swapped_legs_are_reported_and_corrected(tmp_path):
 
 
 def test_legs_swapped_while_passing_are_corrected(tmp_path):
-    """From then on the same leg would seem to strike twice in a row."""
+    """Without the correction, the same leg would seem to strike twice in a row."""
     time, angle = sampled(fps=1000.0)
     rows = time > 4.0 * PERIOD_S
     first = np.flatnonzero(rows & (angle[:, 0] - angle[:, 1] > 0.0))[0]
@@ -128,7 +128,7 @@ def test_legs_swapped_while_passing_are_corrected(tmp_path):
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 1.8, 2.31])
 @pytest.mark.parametrize("fps", [60.0, 100.0, 240.0])
 def test_legs_swapped_while_close_together_are_corrected(at_s, fps, tmp_path):
-    """One of both exchanges may not be visible, because the legs pass each other."""
+    """As the legs pass each other, one of the two exchanges may be invisible."""
     time, angle = sampled(fps=fps, noise=3e-4)
     first = int(at_s * fps)
     angle[first : first + 3] = angle[first : first + 3, ::-1]
@@ -286,7 +286,7 @@ def test_implausibly_large_angles_are_rejected_until_a_unit_is_stated(tmp_path):
 
 
 def test_implausibly_small_angles_raise_a_warning(tmp_path):
-    """Radians that the header calls degrees, measured from the slope's normal."""
+    """The angles are in radians from the slope's normal, but the header says degrees."""
     time, angle = sampled()
     header = "time (s),angle 1 (deg),angle 2 (deg)"
     rows = "\n".join(f"{t:.9f},{a:.12g},{b:.12g}" for t, (a, b) in zip(time, angle + SLOPE, strict=True))
@@ -454,7 +454,7 @@ def test_95_percent_of_strikes_lie_within_two_standard_errors(fps, tmp_path):
 
 @pytest.mark.parametrize(("fps", "noise_deg", "seed"), [(240.0, 0.3, 2), (240.0, 0.7, 3), (120.0, 1.0, 0)])
 def test_noise_of_a_film_neither_hides_a_strike_nor_speaks_against_the_clock(fps, noise_deg, seed, tmp_path):
-    """The rates of a spline followed the noise: legs seemed to swing half as fast. Noise bent curves upwards."""
+    """Rates must not come from a spline that follows the noise: the legs would seem to swing half as fast."""
     summary = read(tmp_path, *sampled(begin=0.1, fps=fps, noise=math.radians(noise_deg), seed=seed))
     assert summary["steps"] == 6
     assert summary["step_periods_s"] == pytest.approx([PERIOD_S] * 6, abs=0.04)
@@ -462,10 +462,12 @@ def test_noise_of_a_film_neither_hides_a_strike_nor_speaks_against_the_clock(fps
 
 
 def test_heel_strike_of_a_noisy_film_is_sought_where_the_foot_came_down(tmp_path):
-    """Where the feet stay almost level after a strike, the mean of all crossings was 0.1 s late."""
+    """If the feet stay almost level after a strike, noise makes them cross several times, and the mean of the crossings
+    is 0.1 s late.
+    """
     time = np.arange(-0.3, 0.3, 1.0 / 120.0)
     noise = 0.01 * np.random.default_rng(0).standard_normal(time.size)
-    # The height of leg 1's foot falls through 0 and stays 12 mm below it, with noise of 10 mm.
+    # The foot of leg 1 falls through height 0 and stays 12 mm below it. The noise is 10 mm.
     fall = np.where(time < 0.0, -0.5 * time, 0.0) - 0.012 * (time > 0.0) + noise
     angle = np.column_stack((0.3 + fall, np.full(time.size, -0.3)))
     crossings = candidates(time, angle, lambda each: each[:, 0] - 0.3)

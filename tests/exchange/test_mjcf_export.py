@@ -1,4 +1,4 @@
-"""Check that exported MJCF compiles without warnings, and sinks in and walks as our contact model does."""
+"""Check that exported MJCF compiles without warnings, and that the model sinks in and walks like our contact model."""
 
 import importlib.util
 import shutil
@@ -21,7 +21,7 @@ from walkerlab.physics.ground.knees import lock_knee
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'walkerlab[engines]'")
 
 STEPS = 10
-BLOCK = 4  # time steps between two looks at the feet
+BLOCK = 4  # number of time steps between two checks of the feet
 TORSO = ("torso", PADS, "contact.pad_pitch=own")
 WALKERS = [("paper",), ("round-feet", PADS), TORSO]
 HEAVY_LEGS = ("paper", "walker.foot_to_mass_m=0.2", "walker.leg_inertia_kg_m2=0.2", "walker.leg_mass_kg=8")
@@ -36,7 +36,7 @@ WEIGHED = [*WALKERS, ("level",), HEAVY_LEGS, SPRUNG, BY_PARTS, KNEED, ROUND_KNEE
 
 @pytest.fixture(autouse=True)
 def no_callback():
-    """Remove the callback: MuJoCo's callbacks are global, and no model compiles while a Python callback is set."""
+    """Remove the callback. MuJoCo's callbacks are global, and no model compiles while a Python callback is set."""
     yield
     mujoco.set_mjcb_control(None)
 
@@ -72,7 +72,7 @@ def walked(model, steps):
 
 @pytest.fixture(params=WEIGHED, ids=" ".join)
 def weighed(request, tmp_path_factory):
-    """A walker to export: one of each exported type, and walkers with other masses and drives."""
+    """Return a walker to export: one of each type that can be exported, and some with other masses and drives."""
     if request.param is not BY_PARTS:
         return request.param
     path = tmp_path_factory.getbasetemp() / "compass-by-parts.yaml"
@@ -81,7 +81,7 @@ def weighed(request, tmp_path_factory):
 
 
 def normal_force(model, foot, depth, weight):
-    """MuJoCo's force (N) on a foot at `depth` (m) in the gait's pose, if joints hold what the ground does not."""
+    """Return MuJoCo's force (N) on a foot at `depth` (m) if the joints hold the walker in the pose of the gait."""
     data = at_start(model)
     geom = model.geom(f"foot_{foot}").id
     pad = next(pad for pad in range(model.ngeom) if model.geom_conaffinity[pad] == model.geom_contype[geom])
@@ -96,7 +96,7 @@ def normal_force(model, foot, depth, weight):
     mujoco.mj_forward(model, data)
     lever = np.zeros((3, model.nv))
     mujoco.mj_jac(model, data, lever, None, data.geom_xpos[geom], model.geom_bodyid[geom])
-    # under this force of the ground nothing would accelerate
+    # With this force of the ground, no body would accelerate.
     data.qfrc_applied[:] = data.qfrc_bias - data.qfrc_passive - weight * lever[2]
     mujoco.mj_forward(model, data)
     assert data.contact.geom.tolist() == [[pad, geom]] or data.contact.geom.tolist() == [[geom, pad]]
@@ -132,7 +132,7 @@ def test_model_compiles_without_warnings_and_survives_saving(walker, tmp_path, c
     mujoco.mj_saveLastXML(str(second), again)
     assert first.read_text() == second.read_text()
     for field in ("body_mass", "body_ipos", "body_inertia", "geom_pos", "geom_size", "geom_solref", "key_qpos"):
-        # MuJoCo saves six digits or more
+        # MuJoCo saves at least six digits.
         assert getattr(again, field) == pytest.approx(getattr(model, field), rel=1e-5, abs=1e-6), field
     assert capfd.readouterr() == ("", "")
 
@@ -143,14 +143,14 @@ def test_plain_simulation_takes_ten_steps_on_the_pads(walker):
     assert export.walk.steps == STEPS
     touches = walked(model_of(*walker), STEPS)
     assert len(touches) == STEPS
-    # its contact is another law, tuned; what is left of that is less than half a per cent
+    # MuJoCo has another contact law, which is tuned to ours. The remaining difference is less than half a per cent.
     periods, lengths = np.diff(touches, axis=0)[-4:].T
     assert periods == pytest.approx(export.walk.periods_s[-4:], rel=0.002)
     assert lengths == pytest.approx(export.walk.lengths_m[-4:], rel=0.005)
 
 
 def test_paper_walker_takes_the_same_steps_in_mujoco():
-    """The last step of our contact model takes .7110 s and .3608 m."""
+    """The last step of our contact model takes 0.7110 s and is 0.3608 m long."""
     touches = walked(model_of("paper"), STEPS)
     assert np.diff(touches, axis=0)[-1] == pytest.approx([0.7111, 0.3604], abs=1e-4)
 
@@ -185,7 +185,7 @@ def test_hip_spring_and_damper_are_joint_properties():
 
 
 def script_in(folder, name, files):
-    """Write exported files, and import their script."""
+    """Write exported files, and import the script among them."""
     for file, text in files.items():
         (folder / file).write_text(text)
     spec = importlib.util.spec_from_file_location(f"{name}_script", folder / f"{name}.py")
@@ -195,7 +195,7 @@ def script_in(folder, name, files):
 
 
 def steps_of(walk, steps, until_s=12.0):
-    """Periods (s) and lengths (m) of a walk with the script's callback."""
+    """Return periods (s) and lengths (m) of a walk with the callback of the script."""
     while len(walk.touches_s) < steps and walk.data.time < until_s:
         mujoco.mj_step(walk.model, walk.data)
     return np.diff(walk.touches_s, prepend=0.0), np.diff(walk.touches_m, prepend=0.0)
@@ -233,7 +233,7 @@ def test_walker_that_falls_takes_fewer_steps_than_requested(tmp_path, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "it walked 1 of 3 steps"
 
 
-# docs/exchange-details.md has all ten steps
+# The first steps suffice here. docs/exchange-details.md has all ten.
 @pytest.mark.parametrize(
     ("walker", "steps"), [(KNEED, 2), (ROUND_KNEED, 2), (LEVEL_KNEED, 3), (STOPPED, 2), (AT_TOUCH, 2)]
 )
@@ -261,7 +261,9 @@ def test_damping_of_each_knee_is_a_property_of_its_joint():
 
 
 def test_exported_script_reacts_to_the_state_and_not_to_time(tmp_path):
-    """Started with rates 1.02 times the gait's, knees lock and touches come at other times than ours."""
+    """The walk starts with 1.02 times the rates of the gait, so touches and locks do not come at the times of
+    our walk.
+    """
     walk = walk_of(tmp_path, *KNEED)
     walk.data.qvel *= 1.02
     periods, _ = steps_of(walk, 2)
@@ -279,7 +281,7 @@ def test_locked_knee_stays_straight_under_load(tmp_path):
 
 @pytest.mark.parametrize("walker", [KNEED, KNEED_TORSO], ids=["kneed", "torso"])
 def test_knee_lock_in_mujoco_equals_our_plastic_impact(walker, tmp_path):
-    """Velocities after the lock are those of `lock_knee`, to the time step in which the knee became straight."""
+    """Velocities after the lock equal those of `lock_knee`, up to the time step in which the knee became straight."""
     export, walk = export_of(*walker), walk_of(tmp_path, *walker)
     data, lock = walk.data, walk.lock
     seen = []
@@ -301,7 +303,7 @@ def test_knee_lock_in_mujoco_equals_our_plastic_impact(walker, tmp_path):
 
 
 def test_knee_stop_in_mujoco_has_the_same_torque_as_ours():
-    """MuJoCo scales a limit by `dof_invweight0`; the torque at a given extension and rate is that of our stop."""
+    """The exported stiffness and damping must allow for `dof_invweight0`, by which MuJoCo scales a limit."""
     export, model = export_of(*STOPPED), model_of(*STOPPED)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -311,7 +313,7 @@ def test_knee_stop_in_mujoco_has_the_same_torque_as_ours():
     data.qpos[1] += 1.0
     data.qpos[knee.qposadr], data.qvel[knee.dofadr] = 1e-3, 0.5
     mujoco.mj_forward(model, data)
-    # its acceleration counts as that of a mass of one thousandth, which the impedance adds
+    # The impedance adds a thousandth of the inertia, which resists the acceleration.
     expected = -(stop.stiffness * 1e-3 + stop.damping * 0.5)
     assert data.qfrc_constraint[knee.dofadr] == pytest.approx(expected, rel=0.01)
 
@@ -336,7 +338,7 @@ def test_tilted_ground_and_tilted_gravity_give_the_same_walk(walker, steps, tmp_
     for walk in walks:
         mujoco.set_mjcb_control(walk.control)
         found.append(np.array(steps_of(walk, steps)))
-    # rounding grows by the stiffness of the contact
+    # The stiffness of the contact magnifies rounding.
     assert found[1] == pytest.approx(found[0], abs=1e-8)
     mujoco.mj_kinematics(walks[1].model, walks[1].data)
     hip = walks[1].data.xanchor[walks[1].hip.id]
@@ -350,7 +352,7 @@ RADII = (0.0, 0.001, 0.02, 0.1, 0.3)
 @pytest.mark.parametrize("radius", RADII)
 @pytest.mark.parametrize("walker", [("round-feet", PADS), KNEED], ids=["compass", "kneed"])
 def test_legs_touch_only_the_ground_of_their_lane(walker, radius):
-    """Programs that ignore collision bits and pairs let every shape collide with every other."""
+    """In programs that ignore collision bits and pairs, every shape collides with every other."""
     name, *sets = walker
     config = load(Path(name), (*sets, f"walker.foot_radius_m={radius}")).config
     export = prepare_export(config, with_gait(*walker)[1])

@@ -1,4 +1,4 @@
-"""Check the answers that the page 'From a phone to parameters' prints."""
+"""Check the answers that the page 'From a phone to parameters' shows."""
 
 import re
 from pathlib import Path

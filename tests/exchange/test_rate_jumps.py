@@ -1,4 +1,4 @@
-"""Find heel strikes by jumps of the rates in recordings with an unknown slope or offset."""
+"""Tests of heel strikes found by jumps of the rates, in recordings with an unknown slope or offset."""
 
 import math
 from pathlib import Path
@@ -28,7 +28,7 @@ def found_gait(config):
 
 
 def recorded(name, strides=4):
-    """Return the config's walker, and times and noisy angles (samples, 2) of its gait."""
+    """Return the walker of a config, with times and noisy angles (samples, 2) of its gait."""
     config = load(Path(name), (f"strides={strides}",)).config
     trajectory = simulate.run(restrict(config, PIPELINE["simulate"].takes), found_gait(config), Silent()).groups[
         "trajectory"

@@ -1,4 +1,4 @@
-"""Read files written by the programs that people use, if these are installed."""
+"""Read files written by real programs, for those that are installed."""
 
 import datetime
 import math
@@ -64,12 +64,12 @@ def test_c3d_labels_continue_in_the_next_parameter(count, tmp_path):
 
 
 def gaps_of(path):
-    """Samples at which a recording has no second foot."""
+    """Return the samples at which the second foot is missing."""
     return np.flatnonzero(np.isnan(read_recording(path).columns["F2.x"])).tolist()
 
 
 def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
-    """This holds even if the gap contains a position."""
+    """The sample is a gap even if the file has a position there."""
     path = tmp_path / "walk.c3d"
     residuals = np.zeros((1, 3, TIMES.size))
     residuals[0, 2, [7, 8]] = -1.0
@@ -81,7 +81,7 @@ def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
 
 @pytest.mark.parametrize("scale", [-1.0, 0.1])
 def test_negative_residual_in_a_file_from_c3d_is_read_as_a_gap(scale, tmp_path):
-    """The file stores floating-point numbers or, with a positive scale, integers."""
+    """The file may store floating-point numbers or, with a positive scale, integers."""
     pytest.importorskip("ezc3d", reason="ezc3d, which reads C3D, is not installed")
     c3d = pytest.importorskip("c3d", reason="c3d is not installed")
     path = tmp_path / "walk.c3d"
@@ -188,7 +188,7 @@ def test_opensim_angles_in_degrees_are_converted(name, header, tmp_path):
     assert read_recording(path).kind_units["angle"] == unit
 
 
-# Whole walks: periods and lengths are read back
+# Whole walks, whose periods and lengths are read back
 
 
 FPS = 100.0
@@ -197,7 +197,7 @@ HEIGHT_PX = 600.0
 
 
 def walk_right(tmp_path, name, **keys):
-    """Read a file, and check that it has the steps of the walk that was written; return what was doubted."""
+    """Read a file, and check that it has the steps of the walk that was written. Return the warnings."""
     summary = walkerlab.read_walk(tmp_path / name, slope_deg=math.degrees(SLOPE), **keys).summary
     assert summary["steps"] == 7
     assert all_steps_are_right(summary, period=1e-4, length=1e-4)
@@ -205,7 +205,7 @@ def walk_right(tmp_path, name, **keys):
 
 
 def pixels():
-    """Return places (samples, marker, axis) in a picture, y downwards."""
+    """Return positions (samples, marker, axis) in a picture, with y downwards."""
     return [400.0, 900.0] + places_of(sampled()[1])[:, :, :2] * [HEIGHT_PX, -HEIGHT_PX]
 
 
@@ -218,7 +218,9 @@ def sports2d():
 
 
 def angles_of_sports2d(process, walks, side):
-    """Return the leg angles (samples, 2) in degrees that Sports2D computes and corrects in a walk right or left."""
+    """Return the leg angles (samples, 2) in degrees that Sports2D computes, with its corrections, for a walk to the
+    right or left.
+    """
     from Pose2Sim.common import angle_dict
 
     across = (pixels() - pixels()[:, :1]) * [1.0 if walks == "right" else -1.0, 1.0]
@@ -226,7 +228,7 @@ def angles_of_sports2d(process, walks, side):
     places = np.stack([across[:, 0], across[:, 1], across[:, 2], across[:, 0]], axis=1)
     about = side, False, list(range(4)), keypoints, names, angle_dict
     angles = np.array([process.compute_angles_for_person(row[:, 0], row[:, 1], *about)[1] for row in places])
-    # Sports2D subtracts the angle of the floor, as `compute_floor_line` finds it in the picture
+    # Sports2D subtracts the angle of the floor that `compute_floor_line` finds in the picture.
     return angles - math.degrees(-SLOPE if walks == "right" else SLOPE)
 
 
@@ -247,7 +249,7 @@ def test_markers_of_sports2d_are_from_the_floor_where_they_are_in_metres(level, 
     parts = []
     for marker, name in enumerate(names):
         part = pandas.DataFrame(np.c_[pixels()[:, marker], np.zeros(len(pixels()))], columns=[name] * 3)
-        floor_rad = -SLOPE  # as `compute_floor_line` returns it
+        floor_rad = -SLOPE  # sign as `compute_floor_line` returns it
         size = (1.0, HEIGHT_PX, 10.0, 1920, 1080, 0.0, 900.0, -floor_rad, "none")
         parts.append(process.convert_px_to_meters(part, *size) if level else part)
     table = pandas.concat([pandas.Series(sampled()[0], name="time"), *parts], axis=1)

@@ -1,4 +1,4 @@
-"""Read columns and quantities of files that other programs and people write."""
+"""Tests of reading columns and quantities from files of other programs and people."""
 
 import math
 
@@ -27,7 +27,7 @@ STO = "walk\nversion=1\nnRows=99\nnColumns=3\ninDegrees=no\nendheader\ntime\tang
     f"{t}\t{a}\t{b}" for t, (a, b) in zip(TIMES, ANGLES, strict=True)
 )
 MOT = STO.replace("inDegrees=no", "inDegrees=yes")
-# ids not in the order of the document, two blocks of which the second repeats the last sample of the first
+# The ids are not in the order of the document, and the second of the two blocks repeats the last sample of the first.
 BLOCKS = [(TIMES[:3], ANGLES[:3]), (TIMES[2:], ANGLES[2:])]
 RES = (
     '<?xml version="1.0"?><Results xmlns="http://www.mscsoftware.com/:xrf10"><Analysis name="A"><Units angle="rad" '
@@ -48,7 +48,7 @@ FILES = {"own.csv": OWN, "table.txt": ADAMS_TABLE, "degrees.csv": DEGREES, "walk
 
 
 def marker_file(times, places, unit="mm"):
-    """A .trc file of three markers, without the blank line that is often missing."""
+    """Return a .trc file of three markers without the blank line below the header, which many files lack."""
     head = "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\t"
     head += f"OrigDataStartFrame\tOrigNumFrames\n100\t100\t{len(times)}\t3\t{unit}\t100\t1\t{len(times)}\n"
     head += "Frame#\tTime\tHIP\t\t\tFOOT1\t\t\tFOOT2\t\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n"
@@ -60,7 +60,9 @@ def marker_file(times, places, unit="mm"):
 
 
 def markers():
-    """Places (frames, marker, axis) of a hip that moves along x and of the ends of two legs, y upwards, mm."""
+    """Return positions (frames, marker, axis) in mm of a hip that moves along x and of the ends of two legs, with y
+    upwards.
+    """
     hip = np.stack([100.0 * TIMES, np.full_like(TIMES, 900.0), np.zeros_like(TIMES)], axis=1)
     feet = [hip + 900.0 * np.stack([np.sin(a), -np.cos(a), 0.0 * a], axis=1) for a in ANGLES.T]
     return np.stack([hip, *feet], axis=1)
@@ -97,7 +99,7 @@ def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
 
 
 def test_unit_of_one_component_applies_to_it_alone(tmp_path):
-    """That component may be the time."""
+    """The component may also be the time."""
     text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
     walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), Recorded())
     assert walk.time_s == pytest.approx(TIMES / 1000.0, abs=1e-12)
@@ -105,7 +107,9 @@ def test_unit_of_one_component_applies_to_it_alone(tmp_path):
 
 
 def test_adams_results_begin_with_the_initial_conditions(tmp_path):
-    """ADAMS writes the state at time 0 into a block of its own; a static solution at the same time replaces it."""
+    """ADAMS writes the state at time 0 into a separate block. If there is a static solution at the same time, it
+    replaces that state.
+    """
     initial = '<Data name="initialConditions_001" id="9"><Step type="initialConditions">-0.1\n0.5 0.6</Step></Data>'
     path = written(tmp_path, "walk.res", RES.replace('<Data name="dynamic_001"', f'{initial}<Data name="dynamic_001"'))
     walk = as_walk(read_recording(path), Recorded())

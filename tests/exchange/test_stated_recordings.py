@@ -1,4 +1,6 @@
-"""Tests of keys for what a file does not say: tilt, direction, belt, frame rate, part, likelihood, signs, constants."""
+"""Tests of the keys that state what a file does not: tilt, direction, belt, frame rate, part, likelihood, signs,
+constants.
+"""
 
 import math
 import re
@@ -219,13 +221,13 @@ def test_film_of_variable_rate_needs_the_time_of_each_frame(tmp_path):
     assert not doubts
 
 
-def test_frame_rate_of_a_table_with_one_row_is_refused_in_words(tmp_path):
+def test_frame_rate_of_a_table_with_one_row_is_refused_with_a_message(tmp_path):
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.0, 0.1, -0.1)])
     with pytest.raises(ConfigError):
         steps_of(path, fps=100.0)
 
 
-def test_angles_that_would_overflow_are_refused_in_words(tmp_path):
+def test_angles_that_would_overflow_are_refused_with_a_message(tmp_path):
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.01 * n, 1e300 * n, 0.1) for n in range(200)])
     with pytest.raises(ConfigError):
         steps_of(path)
@@ -293,7 +295,7 @@ def test_values_whose_squares_overflow_are_gaps(tmp_path):
 
 
 def test_step_lengths_follow_from_the_belt_speed(tmp_path):
-    """The leg is 10 % shorter than the config's."""
+    """The leg is 10 % shorter than in the config."""
     speed = 0.9 * LENGTH_M / PERIOD_S
     summary = read(tmp_path, *sampled(), belt_speed_m_s=speed)
     assert summary["step_lengths_m"] == pytest.approx([0.9 * LENGTH_M] * 7, abs=1e-5)
@@ -321,7 +323,7 @@ def test_frame_rate_is_rejected_for_a_table_of_steps(tmp_path):
 
 
 def deeplabcut(places, likelihood, individuals=()):
-    """Write what DeepLabCut writes: three header rows, or four with individuals, and frames as the index."""
+    """Return a table in DeepLabCut's layout: three header rows, or four with individuals, and frames as the index."""
     names = [f"{part},{part},{part}" for part in ("hip", "foot1", "foot2")]
     head = [f"scorer{',net' * 9}"]
     head += [f"individuals{f',{each}' * 9}" for each in individuals]
@@ -387,7 +389,7 @@ def test_slope_of_a_sports2d_film_is_estimated_only_if_the_floor_is_stated(tmp_p
 
 
 def sports2d_angles(angle):
-    """Write angles of segments from the horizontal, as Sports2D 0.8.34 does."""
+    """Return a table of segment angles from the horizontal, in the layout of Sports2D 0.8.34."""
     head = ["Coordinates", "version=1", f"nRows={len(angle)}", "nColumns=3", "inDegrees=yes", "", "endheader"]
     rows = [f"{n / 100.0}\t" + "\t".join(map(str, row)) for n, row in enumerate(np.degrees(angle) - 90.0)]
     return "\n".join([*head, "time\tright thigh\tleft thigh", *rows]) + "\n"
@@ -410,7 +412,7 @@ def test_legs_that_do_not_meet_at_one_hip_are_doubted(apart_m, tmp_path):
     time, angle = sampled()
     hip, *feet = places_of(angle)[:, :, :2].swapaxes(0, 1)
     other = np.c_[apart_m * np.sin(2.0 * np.pi * time), 0.0 * time]
-    # the whole second leg moves, so it keeps its length
+    # The whole second leg is moved, so its length stays the same.
     markers = {"HIP1": hip, "FOOT1": feet[0], "HIP2": hip + other, "FOOT2": feet[1] + other}
     header = ["time (s)", *(f"{name}.{axis} (m)" for name in markers for axis in "xy")]
     table = np.c_[time, *markers.values()]

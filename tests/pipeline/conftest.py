@@ -1,4 +1,4 @@
-"""A copy of the toy pipeline for each test, importable here and in other processes."""
+"""Fixtures that give each test a copy of the toy pipeline, which this and other processes can import."""
 
 import importlib
 import os
@@ -48,7 +48,7 @@ class Toy:
         return execute(loaded, target, folder, Options(**options, dry=True), graph=self.graph)
 
     def edit(self, module, old, new):
-        """Change the source of a toy stage. This process keeps the version that it has imported."""
+        """Change the source of a toy stage. This process keeps using the version that it has imported."""
         path = self.source / "toy" / f"{module}.py"
         text = path.read_text()
         assert old in text

@@ -1,4 +1,4 @@
-"""Tests of long campaigns: only with `--full`, kept when complete, and resumed after an interruption."""
+"""Tests of long campaigns, which run only with `--full`, are kept when complete, and resume after an interruption."""
 
 import pytest
 
@@ -65,11 +65,11 @@ def test_interrupted_campaign_resumes_with_the_same_result(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     journal = toy.runs / "paper" / "census.parts"
     assert journal.read_bytes().count(b"\n") == 1 + 3
-    monkeypatch.setenv("TOY_STONES", "1")  # three of four are there
+    monkeypatch.setenv("TOY_STONES", "1")  # Three of four stones have been counted.
     toy.execute("census")
     assert not journal.exists()
     monkeypatch.delenv("TOY_STONES")
-    toy.execute("census", config="rigid-only", force=True)  # else the same result would be taken over
+    toy.execute("census", config="rigid-only", force=True)  # Without `force`, the existing result would be reused.
     undisturbed = read(toy.runs / "rigid-only" / "census.h5")
     assert read(toy.runs / "paper" / "census.h5").digest() == undisturbed.digest()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# in a process of its own, since this one has loaded kernels for other tests
+# It needs a fresh process, because this one has loaded kernels for other tests.
 AHEAD_THEN_RUN = """
 import sys
 from pathlib import Path

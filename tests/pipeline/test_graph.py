@@ -62,7 +62,7 @@ def test_table_names_the_config_type_in_the_signature_of_the_stage(stage):
 
 @pytest.mark.parametrize("config", ["paper", "kneed"])
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
-def test_stage_receives_exactly_the_config_values_of_its_key(stage, config):
+def test_stage_receives_exactly_the_config_values_in_its_key(stage, config):
     loaded = load(Path(config)).config
     takes = stage.takes_under(loaded)
     assert shown(restrict(loaded, takes)) == (set(Config.model_fields) if takes is None else set(dotted_keys(takes)))
@@ -193,7 +193,7 @@ COMPASS = ["equations=as-printed", "slope_deg=1"]
         ("simulate", "paper", [], set()),
         ("simulate", "paper", COMPASS, {LAW}),
         ("simulate", "simplest", COMPASS, {LAW}),
-        ("fixedpoint", "paper", [], {LAW}),  # the paper's walker has a gait with each set of equations
+        ("fixedpoint", "paper", [], {LAW}),  # The paper's walker has a gait for each set of equations.
         ("fixedpoint", "simplest", [], set()),
         ("fixedpoint", "kneed", [], set()),
         ("contact-sim", "paper", ["contact.terrain=plane"], set()),

@@ -69,7 +69,7 @@ def test_page_of_an_interrupted_command_says_so(toy, jobs, error):
 def test_early_page_says_what_is_missing(toy, listener, jobs):
     toy.graph = with_page_early(toy.graph)
     final = toy.execute("page", reporter=listener, jobs=jobs).run_dir / "report.html"
-    assert f"picture: {STILL_COMPUTED}" in listener.pages[0]  # which stages side by side are ready is chance
+    assert f"picture: {STILL_COMPUTED}" in listener.pages[0]  # It is random which of the parallel stages are ready.
     assert "'drop'" in listener.pages[0]
     assert STILL_COMPUTED not in final.read_text()
 

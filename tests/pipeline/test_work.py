@@ -1,4 +1,6 @@
-"""Tests of units of work: each is kept as soon as it is complete, and none is computed twice or lost with a worker."""
+"""Tests of units of work: each is stored as soon as it is complete, and none is computed twice or lost with a
+worker.
+"""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Tests of the scene that a config with a contact block gives, and of its start."""
+"""Tests of the scene that is built from a config with a contact block, and of its start."""
 
 import functools
 import math
@@ -37,7 +37,8 @@ def test_walk_starts_with_the_stance_foot_touching_and_rolling(radius, theta_2, 
     np.testing.assert_allclose((stance.along, stance.height), 0.0, atol=1e-14)
     np.testing.assert_allclose((stance.slip, stance.vertical_velocity), 0.0, atol=1e-13)
     assert (start[2:4], start[6:]) == (rigid[:2], rigid[2:])
-    # legs of one length with their balls on the slope: symmetric to its normal, so the other ball touches too
+    # Both legs have one length and their balls are on the slope, so they are symmetric and the other ball touches as
+    # well.
     assert swing.height == pytest.approx(0.0, abs=1e-14)
     apart = 2 * (1.0 - radius) * math.sin(theta_2 + 0.0174)
     assert stance.along - swing.along == pytest.approx(apart, abs=1e-13)
@@ -48,7 +49,7 @@ def test_walk_starts_with_the_stance_foot_touching_and_rolling(radius, theta_2, 
 
 
 def test_point_foot_starts_like_the_pinned_foot():
-    """For a foot without radius, rolling is turning about the hinge."""
+    """A foot without radius turns about the hinge when it rolls."""
     rigid = (-0.2042, 0.1694, -0.6, -0.86)
     free, pinned = (
         start_state(scene_of("walker.foot_radius_m=0", f"contact.stance={stance}"), rigid)
@@ -65,7 +66,7 @@ def test_adams_units_of_the_paper_are_converted_to_si():
 
 
 def test_static_penetration_is_for_the_whole_weight_on_one_foot():
-    """0.059 mm and over-damped, against the same two numbers worked out in N and mm."""
+    """It is 0.059 mm, and the contact is over-damped. Compare both with values computed in N and mm."""
     scene = scene_of()
     depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
     foot = stance_equilibrium(scene)

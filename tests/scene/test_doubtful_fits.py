@@ -1,4 +1,4 @@
-"""Tests of identified walkers with doubtful errors: hidden noise, outliers, and contradictions."""
+"""Tests of identifications with doubtful errors: hidden noise, outliers, and contradictions."""
 
 import re
 import tracemalloc
@@ -28,7 +28,7 @@ from walkerlab.scene.rigid import rigid_walker
 
 LEG, HIP = "walker.leg_length_m", "walker.hip_mass_kg"
 WALKER = ("slope_deg=2", "walker.leg_length_m=1", "walker.foot_to_mass_m=0.5", "walker.leg_mass_kg=5", HIP + "=10")
-# three walks, measured to 1 ms and 1 mm; the last has outliers
+# Three walks are measured to 1 ms and 1 mm. The last one has outliers.
 PERIODS = (
     0.722004,
     0.718981,
@@ -271,7 +271,7 @@ def test_wrong_hip_mass_is_named_with_its_likelihood_gain():
     wrong = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None})
     assert wrong.verdict.fit == "fits-but"
     text = " ".join(wrong.verdict.reasons)
-    # the walk determines the ratio of both masses only
+    # The walk determines only the ratio of both masses.
     assert f"--fit {HIP}" in text or "--fit walker.leg_mass_kg" in text
     right = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None, HIP: None})
     gain = float(re.search(r"by about ([\d.]+):", text)[1])
@@ -326,7 +326,7 @@ def test_errors_allow_for_every_disturbance_that_may_have_moved_the_walk():
     weights = np.exp(likelihoods - likelihoods.max())
     average = np.tensordot(weights / weights.sum(), alone, 1)
     assert average_covariance(fitted, noises, np.eye(2)) == pytest.approx(average, rel=1e-9)
-    # In no direction are the stated errors smaller than the average or those of the likeliest disturbance.
+    # In every direction, stated errors are at least the average errors and those of the likeliest disturbance.
     likeliest = np.linalg.inv(marginalise(fitted.evaluation.information, 2))
     stated = result.information.covariance / np.outer(fitted.forecast.scales, fitted.forecast.scales)
     for smaller in (average, likeliest):
@@ -349,7 +349,7 @@ def test_stated_errors_hold_for_correlated_angle_noise():
     samples = len(fitted.forecast.measured.angles_rad)
     moves, plain, robust = [], [], []
     for _ in range(60):
-        # each sample shares its noise with the 9 before it
+        # Each sample shares noise with the 9 samples before it.
         drawn = rng.normal(0.0, noise.measurement[0], (samples + 10, 2)).cumsum(axis=0)
         data = replace(fitted.data, residuals=(drawn[10:] - drawn[:-10]).ravel() / 10**0.5)
         evaluation = evaluate(reduce(data), noise)

@@ -1,4 +1,4 @@
-"""Tests of sentences on the ends of walks: trips on pads differ from falls."""
+"""Tests of the sentences that say how walks end, in which a trip on a pad differs from a fall."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Identify parameters from synthetic walks, and recognise walks that no walker explains."""
+"""Tests of parameters identified from synthetic walks, and of walks that no walker explains."""
 
 import runpy
 from dataclasses import replace
@@ -41,7 +41,9 @@ def verdict(result):
 
 
 def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
-    """More than two of twelve walks lie outside with a probability of 2 %. The script checks a thousand."""
+    """The probability that more than two of twelve walks lie outside is 2 %. scripts/identification_coverage.py checks
+    a thousand walks.
+    """
     inside, estimates, errors, _ = CAMPAIGN["coverage"](truth(), range(12))
     assert inside.sum() >= 10
     ratio = np.sqrt((errors**2).mean(axis=0)) / np.abs(estimates - truth().values).std(axis=0, ddof=1)
@@ -49,7 +51,7 @@ def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
 
 
 def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
-    """Plain least squares makes them a quarter too small."""
+    """By plain least squares they would be a quarter too small."""
     paper = truth("steps", "paper", CAMPAIGN["WALKERS"]["paper"])
     measured = [paper.identify(*paper.walk(seed)).measured_radius for seed in range(8)]
     plain, corrected, errors = np.array([(each.plain, each.value, each.standard_error) for each in measured]).T
@@ -59,7 +61,7 @@ def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
     assert 0.5 < errors.mean() / corrected.std(ddof=1) < 2.0
 
 
-def test_quantity_that_a_coarse_clock_shows_as_constant_leaves_the_multiplier_as_it_is():
+def test_quantity_without_variation_does_not_change_the_multiplier():
     lengths = np.array([0.9, -0.5, 0.3, -0.1, 0.08, -0.2, 0.1, 0.05, -0.03, 0.02])[:, None]
     with_periods = np.column_stack((np.full(10, 0.75), lengths))
     assert spectral_radius(with_periods) == pytest.approx(spectral_radius(lengths), rel=1e-12)
@@ -67,7 +69,7 @@ def test_quantity_that_a_coarse_clock_shows_as_constant_leaves_the_multiplier_as
 
 
 def test_quick_refit_stays_at_the_estimate_of_a_soft_loss():
-    """If the outlier was not trimmed, it would move the estimate."""
+    """Without trimming, the outlier would move the estimate."""
     measured, _ = truth().walk(0)
     periods = measured.periods_s.copy()
     periods[7] += 0.02
@@ -102,7 +104,7 @@ def test_angles_determine_the_hip_mass():
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_large_deviations_on_a_rough_floor_are_not_a_misfit(seed):
-    """The floor alone moves the simplest walker's angles by 5 % of their size at the same phase of every step."""
+    """At equal phases of the steps, the floor alone changes the angles of the simplest walker by 5 % of their size."""
     own = truth("angles", "simplest")
     result = own.identify(*own.walk(seed))
     assert verdict(result) in USABLE
@@ -211,7 +213,7 @@ def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later(model, accu
     )
     assert second.durations_s[:5] == pytest.approx(first.durations_s[1:], rel=accuracy)
     assert second.angles_rad[:5] == pytest.approx(first.angles_rad[1:], rel=accuracy)
-    # leg 2 is lighter and swings faster
+    # Leg 2 is lighter, so it swings faster.
     assert second.durations_s[0] < 0.95 * first.durations_s[0]
 
 
@@ -224,7 +226,7 @@ def test_legs_touch_at_the_angles_that_are_sampled_then(name, first_leg):
         walk = walks.take_disturbed_walk(z, family.start, np.zeros(5))
         touches = np.cumsum(walk.durations_s) * (1.0 - 1e-6)
         sampled = walks.sample_legs(z, family.start, np.zeros(5), touches)
-        # the legs land in turns, beginning with the one that swings first
+        # The legs land in turns, beginning with the leg that swings first.
         assert walk.angles_rad == pytest.approx(sampled[[0, 1, 2, 3], [0, 1, 0, 1]], abs=accuracy)
 
 

@@ -1,4 +1,4 @@
-"""Check that each reduced scene gives the numbers of the full one without the omitted part."""
+"""Check that each reduced scene gives the same results as the full scene, except for the omitted part."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -48,7 +48,9 @@ def same_to_rounding(found, expected, scale):
 
 
 def stiffest(walker, y):
-    """Return the factor by which the ground magnifies rounding of a foot's height: force gradient over mass."""
+    """Return the factor by which the ground magnifies rounding of a foot's height, which is force gradient over
+    mass.
+    """
     J = gradient_of(place_on_ground(walker, BOTH), y)
     return np.abs(J).max()
 
@@ -69,7 +71,9 @@ def test_frictionless_ground_is_a_coefficient_of_zero(state, radius):
 
 
 def rates_with_point_feet(walker, y):
-    """Rates of the state by feet that are described without a radius, the laws of force the package's."""
+    """Return the rates of the state for feet that are described without a radius, with the force laws of the
+    package.
+    """
     whole, n = walker.whole, int(walker.whole.bodies)
     angle, omega = np.array(y[2 : 2 + n]) + walker.slope, np.array(y[4 + n :])
     s, c = np.sin(angle), np.cos(angle)
@@ -107,7 +111,7 @@ def test_foot_in_the_air_moves_as_if_there_were_no_ground(state, clearance):
 
 @given(state=states)
 def test_leg_without_inertia_is_a_point_mass_on_a_massless_bar(state):
-    """Described in two ways: a body with an inertia of zero, and a particle."""
+    """The leg is described in two ways, as a body with zero inertia and as a particle."""
     legs = compass_assembly(CompassParts(1.0, 0.5, 5.0, 10.0, 0.0, 0.001))
     particles = tuple(Particle(f"mass of {leg.name}", leg.mass_kg, leg.name, leg.centre_m) for leg in legs.bodies)
     bars = tuple(Body(leg.name, 0.0, (0.0, 0.0)) for leg in legs.bodies)
@@ -121,7 +125,7 @@ def test_leg_without_inertia_is_a_point_mass_on_a_massless_bar(state):
 
 
 def test_walk_on_frictionless_ground_equals_that_with_zero_coefficients():
-    """The same steps to the last bit, where no step ends at a switching point of the friction law."""
+    """Steps are equal to the last bit, because no solver step ends at a switching point of the friction law."""
     ends = []
     for law in (NO_FRICTION, Frictionless()):
         scene = contact_scene(load(None, ()).config, 0.3714)
@@ -139,7 +143,7 @@ def test_frictionless_ground_has_four_fewer_switching_points():
 
 @pytest.fixture(scope="module")
 def walks():
-    """Both walks by stage and by what outputs ask for."""
+    """Return walks of both models, by stage and by requested outputs."""
     given = ("strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714")
 
     def walk(stage, outputs):
@@ -175,7 +179,7 @@ def test_stated_size_of_an_output_is_correct(walks, stage, numbers, output):
     group = walks[stage][(output,)]["trajectory"]
     samples = group["time"].size
     columns = [variable.values.size / samples for variable in group.variables.values() if variable.units != "1"]
-    assert sum(columns) - 1 == numbers[output]  # the time itself
+    assert sum(columns) - 1 == numbers[output]  # The time itself is not counted.
 
 
 def test_stated_savings_of_a_scene_are_correct():
@@ -215,7 +219,8 @@ def test_preview_lists_the_same_omissions_as_the_result(tmp_path, sets):
 def test_pinned_step_is_integrated_in_as_many_angles_as_can_change(name, sets, angles):
     config = load(Path(name), (*sets, "contact.stance=pinned")).config
     scene = contact_scene(config, 0.4)
-    assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles  # the stance knee is locked
+    # The stance knee is locked, so a kneed walker has one body less.
+    assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles
     said = next(one for one in omissions.contact_walk_omissions(config) if "pinned" in one["why"])
     assert f"{angles} angles suffice" in said["why"]
     assert said["saves"].startswith(f"4 of {2 * angles + 4} equations")

@@ -117,7 +117,7 @@ def test_walk_of_unequal_legs_on_pads_settles_on_the_contact_gait(leg_2):
     np.testing.assert_allclose(walk.periods_s[-2:], gait.periods_s, atol=2e-5)
     np.testing.assert_allclose(walk.lengths_m[-2:], lengths_between_touches(gait), atol=2e-5)
     assert abs(np.diff(gait.periods_s)[0]) > 1e-3
-    # each foot comes down in the middle of its pads
+    # Each foot lands in the middle of its pads.
     lanes, pitch = scene.ground.terrain.lanes, scene.ground.terrain.pitch
     own = walk.touch_along_m[-2:] - np.array(lanes)
     off = own - 2.0 * pitch * np.round(own / (2.0 * pitch))
@@ -133,7 +133,7 @@ def test_stance_times_last_from_touch_to_lift_of_each_foot():
     touches = np.append(0.0, walk.touch_time_s)
     inside = sample_feet(scene.walker, walk.samples)[:, :, 1] < 0.0
     for step, stance_s in enumerate(walk.stance_s[:5]):
-        foot = (step + 1) % 2  # leg 2 stands first
+        foot = (step + 1) % 2  # Leg 2 is the first stance leg.
         after = walk.samples.time_s > touches[step] + 10 * interval
         lift = walk.samples.time_s[after & ~inside[:, foot]][0]
         assert touches[step] + stance_s == pytest.approx(lift, abs=2 * interval)
@@ -172,6 +172,29 @@ def test_damped_knee_takes_the_same_work_from_both_models():
     assert walk.driven.hip == 0.0
 
 
+def test_spring_at_the_hip_and_dampers_at_the_knees_do_separate_work():
+    spring = 0.2
+    sets = ("walker.knee.damping_N_m_s_per_rad=0.01", f"walker.hip.spring_N_m_per_rad={spring}")
+    config = config_of("kneed", *sets, "contact.terrain=plane")
+    state = gait_of(config).state
+    scene = scene_on_pads(config, 0.4, state)
+    # Both feet stand on the slope, but closer together than they land, so the spring takes up energy.
+    half = len(state) // 2
+    middle = 0.5 * (state[SWING] + state[STANCE])
+    closer = (middle + 0.9 * (angle - middle) for angle in state[:half])
+    start = start_state(scene, (*closer, *state[half:]))
+    walks = [scene.walk(start, 1, tolerances_of(config, 1))]
+    walks.append(scene.walk(start, 1, tolerances_of(config, 1), walks[0].touch_time_s))
+    walk = walks[1]
+    assert walk.steps == 1
+    touched = walk.samples.states[-1]
+    taken_up = 0.5 * spring * ((touched[2] - touched[3]) ** 2 - (start[2] - start[3]) ** 2)
+    assert taken_up > 1e-4
+    assert walk.driven.hip == pytest.approx(-taken_up, rel=1e-6)
+    assert walk.driven.knees == pytest.approx(walk.samples.driven_J[-1, 1], rel=1e-6)
+    assert walk.driven.knees < 0.0
+
+
 LEVEL = ("slope_deg=0", "walker.hip={spring_N_m_per_rad: 10}")
 
 
@@ -179,7 +202,7 @@ def test_push_offs_of_both_legs_drive_a_gait_that_limps():
     gait = gait_of(config_of("paper", *LEVEL, "push_off={impulse_N_s: 4, leg_2: {impulse_N_s: 3.9}}"))
     equal = gait_of(config_of("paper", *LEVEL, "push_off.impulse_N_s=3.95"))
     assert np.mean(gait.steps, axis=0) == pytest.approx(equal.steps[0], rel=1e-4)
-    # the weaker push of leg 2 comes as leg 1 lands, so the step of leg 2 that follows is the longer in time
+    # Leg 2 pushes off as leg 1 lands. Its push is weaker, so the step of leg 2 that follows takes longer.
     assert gait.asymmetry["step_period"] > 1e-3
 
 
@@ -205,7 +228,7 @@ def test_each_leg_pushes_off_with_its_own_impulse_on_compliant_ground(first, sec
     start = start_state(scene, gait.state)
     one, two = (scene.walk(start, steps, tolerances_of(config, steps)) for steps in (2, 3))
     assert two.steps == 3
-    # leg 1 lands first, and leg 2 trails
+    # Leg 1 lands first, so leg 2 is the trailing leg.
     assert (one.driven.push_off > 0.0) == (second > 0.0)
     assert (two.driven.push_off > one.driven.push_off) == (first > 0.0)
     assert two.energy_balance_residual_J < 1e-6
@@ -249,7 +272,7 @@ def test_flips_of_legs_that_differ_lie_on_a_curve_over_slope_and_mass():
     assert (curve["kind"], curve["period"]) == ("flip", 2)
     for slope_deg, mass in (curve["begins"], curve["ends"]):
         gait = gait_of(config_of("prosthesis", f"slope_deg={slope_deg}", f"walker.leg_2.leg_mass_kg={mass}"))
-        # the last point is interpolated to the edge of the plane
+        # The last point is interpolated to the edge of the plane.
         assert gait.stride_multipliers[0] == pytest.approx(-1.0, abs=1e-4)
 
 
@@ -268,11 +291,11 @@ def test_walker_with_one_knee_and_a_straight_leg_settles_on_its_gait_on_complian
     np.testing.assert_allclose(walk.periods_s[-2:], gait.periods_s, atol=5e-4)
     np.testing.assert_allclose(gait.periods_s, np.array(rigid.steps)[:, 0], atol=2e-3)
     np.testing.assert_allclose(lengths_between_touches(gait), np.array(rigid.steps)[:, 1], atol=2e-3)
-    # the leg with the knee swings in every other step, and its knee locks once
+    # The leg with the knee swings in every other step, in which its knee locks once.
     assert np.isfinite(walk.knee_strike_time_s[::2]).all()
     assert np.isnan(walk.knee_strike_time_s[1::2]).all()
     assert walk.energy_balance_residual_J < walk.explained_residual_J
-    # where the straight leg swings, the section has two coordinates fewer
+    # If the straight leg swings, the section has two coordinates fewer.
     assert (gait.z.size, gait.steps[0].z.size) == (8, 6)
     assert math.sqrt(abs(gait.multipliers[0])) == pytest.approx(rigid.spectral_radius, rel=0.05)
 
@@ -298,7 +321,7 @@ def test_peg_leg_is_by_default_the_first_leg_with_its_knee_locked():
     assert walker.kneed
     assert not walker.exchanged.kneed
     assert math.hypot(walker.hip_x, walker.hip_y) == pytest.approx(1.0)
-    # standing, it is a locked leg; swinging, it has the inertia of one
+    # As a stance leg it is a locked leg, and as a swing leg it has the inertia of one.
     kneed = rigid_walker(config_of("kneed"))
     np.testing.assert_allclose(walker.A, kneed.A, atol=1e-15)
     np.testing.assert_allclose(walker.exchanged.A[:2, :2].sum(), kneed.A.sum(), rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Identify legs that differ from walks by a plain integration of both swings."""
+"""Tests of identifying legs that differ, from walks by a plain integration of both swings."""
 
 from functools import cache
 from pathlib import Path
@@ -30,7 +30,7 @@ def gait(*sets):
 
 @cache
 def measured(heavier, level, seed=1):
-    """A walk of the paper's walker with a heavier leg 2, which leg 1 begins."""
+    """Simulate and measure a walk of the paper's walker with a heavier leg 2. Leg 1 swings first."""
     plain = Walker((compass_leg(5.0), compass_leg(5.0 + heavier)), 10.0, 0.0174)
     start = np.array(gait(f"{MASS}={5.0 + heavier}")["state"]) * [1.0, 1.0, 1.004, 1.004]
     rng = np.random.default_rng(seed)
@@ -42,7 +42,7 @@ def measured(heavier, level, seed=1):
 
 
 def begun(walk, leg, stated=None):
-    """Return twenty steps of a walk that begins with this leg. `stated` is what the data say about the leg."""
+    """Return twenty steps of a walk in which `leg` swings first. `stated` is the leg that the data name, if any."""
     part = slice(leg - 1, leg + 19)
     return MeasuredWalk(walk.periods_s[part], walk.lengths_m[part], first_leg=stated)
 
@@ -86,7 +86,7 @@ def test_data_that_do_not_say_which_leg_begins_leave_both_answers():
     result = identify(begun(measured(HEAVIER, "steps"), 1), MASS, "walker.hip_mass_kg")
     assert result.first_leg.by == "guess"
     by_leg = sorted((result.leg_differences[0].value, result.other_differences[0].value))
-    # with leg 2 first, all masses are those of the walk times 5 / 5.31
+    # If leg 2 is taken for the first leg, all masses of the walk are multiplied by 5 / 5.31.
     assert by_leg == pytest.approx([5.0 * 5.0 / (5.0 + HEAVIER) - 5.0, HEAVIER], abs=0.1)
     text = sentences(result)
     assert "heavier" in text

@@ -1,4 +1,6 @@
-"""Tests of planned measurements: expected errors compared with a dense normal distribution, and what reduces them."""
+"""Tests of planned measurements: expected errors are compared with a dense normal distribution, and measures that
+reduce them.
+"""
 
 from pathlib import Path
 
@@ -90,7 +92,9 @@ def test_start_too_far_from_the_gait_has_no_plan(config, gait):
 
 @pytest.mark.parametrize("model", ["rigid", "contact"])
 def test_planned_error_of_the_mass_of_leg_2_is_a_fraction_of_a_kilogram(model):
-    """A compass of equal legs; the prediction agrees with what a measured limp leaves, 0.008 kg after 20 steps."""
+    """The compass has equal legs. The predicted error agrees with that from a measured limp, 0.008 kg after 20
+    steps.
+    """
     config = load(Path("paper")).config
     gait = run_in_memory("fixedpoint", config).summary
     question = Identify(fit={"walker.leg_2.leg_mass_kg": None}, model=model)

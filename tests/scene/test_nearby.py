@@ -1,4 +1,4 @@
-"""Find the nearest gait of a walker without one: on another slope, or with its feet ahead of its shanks."""
+"""Tests of the nearest gait for a walker without one: on another slope, or with feet ahead of the shanks."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Check that a user's own friction law is treated as ADAMS's is, from what it declares."""
+"""Check that a friction law of a user is treated like that of ADAMS, by what it declares."""
 
 import math
 from dataclasses import replace
@@ -34,7 +34,7 @@ START = (-0.2042, 0.1694, -0.605819, -0.861041)
 
 
 class Regularised(NamedTuple):
-    """Friction mu tanh(v / v_0): smooth, without a larger coefficient at rest."""
+    """Friction mu tanh(v / v_0), which is smooth and has no larger coefficient at rest."""
 
     mu: float
     v_0: float
@@ -56,7 +56,7 @@ class Regularised(NamedTuple):
 
 @pytest.fixture
 def own(monkeypatch):
-    """Return the paper's walker on ground with that law."""
+    """Return the scene of the paper's walker on ground with that law."""
     monkeypatch.setitem(
         friction.friction_coefficient._bodies,
         Regularised,
@@ -67,7 +67,7 @@ def own(monkeypatch):
 
 
 class Wordless(NamedTuple):
-    """A law with half of its parts missing."""
+    """Friction law with half of its parts missing."""
 
     mu: float
 
@@ -92,7 +92,7 @@ def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
 def test_incomplete_law_is_rejected_before_anything_runs(stage, monkeypatch, tmp_path):
     config = load().config
     monkeypatch.setitem(FRICTION_LAWS.laws, "coulomb", Wordless)
-    # only laws of other packages are checked beforehand
+    # Only laws of other packages are checked beforehand.
     monkeypatch.setitem(WORDS, "friction", ("none",))
     with pytest.raises(ConfigError, match="it lacks sliding_from, scale_creep, describe"):
         execute(config, stage, RunFolder(tmp_path, "paper"))

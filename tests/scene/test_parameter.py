@@ -1,4 +1,4 @@
-"""Check that every number of the schema is a parameter, or is rejected with a reason, for every type of walker."""
+"""Check for every type of walker that each number of the schema is a parameter or is rejected with a reason."""
 
 from pathlib import Path
 
@@ -66,10 +66,10 @@ def test_models_can_be_built_at_a_nearby_value(config):
         parameter = parameter_of(key, config)
         value = parameter.value_in(config)
         changed = parameter.config_at(config, 1.001 * value if value else 1e-3)
-        if changed is None:  # two numbers that bound each other
+        if changed is None:  # The new value violates a bound that depends on another value.
             changed = parameter.config_at(config, 0.999 * value)
         if (config.walker.type, key) == ("parts", "walker.leg_length_m"):
-            assert changed is None  # it is what the parts have
+            assert changed is None  # The parts determine this value.
             continue
         assert changed is not None, key
         assert parameter.value_in(changed) != value

@@ -1,4 +1,4 @@
-"""Tests of walkers in YAML: types, limits, parts, and rejected descriptions."""
+"""Tests of walkers built from configs: types, limits, parts, and rejected descriptions."""
 
 import math
 import re
@@ -39,7 +39,7 @@ def test_kneed_walker_equals_its_description_by_parts(tmp_path):
 
 
 def kneed_with_feet_ahead(radius_m):
-    """A kneed walker whose feet are 3 cm ahead of its shanks, on a slope of 2.5 degrees."""
+    """Return a config of a kneed walker whose feet are 3 cm ahead of its shanks, on a slope of 2.5 degrees."""
     return load(
         Path("kneed"),
         [
@@ -95,7 +95,7 @@ def test_kneed_walker_with_feet_ahead_equals_its_description_by_parts(radius_m):
 
 
 def test_gait_of_a_kneed_walker_with_feet_ahead_agrees_with_independent_code():
-    """The numbers are those of independent code for the walker put together from its parts."""
+    """The expected values come from an independent program for the walker built from its parts."""
     gait = find_gaits(rigid_walker(kneed_with_feet_ahead(0.2))).gait
     assert gait.period == pytest.approx(0.8295992430, abs=1e-9)
     assert gait.step_length == pytest.approx(0.6736206197, abs=1e-9)
@@ -107,7 +107,7 @@ def test_start_with_feet_ahead_is_computed_on_the_slope():
     config = kneed_with_feet_ahead(0.2)
     moved = load(Path("kneed"), ["slope_deg=2.5", "walker.foot_radius_m=0.2", "walker.foot_centre_ahead_m=0.03", start])
     swing, stance, shank, *_ = moved.config.start
-    # both soles touch the slope: each foot's centre is as far below the hip, along the slope's normal
+    # Both feet touch the slope if their centres are equally far below the hip along the slope's normal.
     depth = [math.cos(angle + config.slope_rad + config.walker.lean_rad) for angle in (swing, stance)]
     assert depth[0] == pytest.approx(depth[1], rel=1e-14)
     assert shank == swing

@@ -156,8 +156,7 @@ def run(
     resolved = resolve(str(config), set_options(set), strides, folder_of(runs), name)
     warn(resolved.loaded.warnings)
     report = run_and_write(resolved, stage, Options(force=force, jobs=jobs))
-    content = artifact.read(report.artifact) if report.artifact is not None else Content()
-    return result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
+    return result_of(stage, report.as_json(), report.content or Content(), report.no_answer, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:

@@ -14,6 +14,10 @@ LINEAR: Final = WORDS["hinge_law"][0]
 MAX_LEG_SPEED: Final = 1e4
 
 
+HINGE_PARAMETERS: Final = ("spring_N_m_per_rad", "damping_N_m_s_per_rad", "torque_N_m")
+"""Keys with the parameters of a hinge law, at hip and knees, in the order of the law's arguments."""
+
+
 class Hip(Block):
     """Torques between the legs, or between the thighs of a kneed walker."""
 

@@ -7,7 +7,7 @@ import re
 import types
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
-from functools import reduce
+from functools import cache, reduce
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
@@ -129,13 +129,18 @@ def leaves(
 
     held  instance of `block`, whose inner blocks select the kinds to list; by default the first kind of each
     """
-    for name, field in block.model_fields.items():
-        inner = block_of(field)
+    for name, field, inner in keys_with_blocks(block):
         instance = getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
             yield from leaves(type(instance) if isinstance(instance, Block) else inner, (*prefix, name), instance)
+
+
+@cache
+def keys_with_blocks(block: type[Block]) -> tuple[tuple[str, FieldInfo, type[Block] | None], ...]:
+    """Return name, field and, as in `block_of`, inner block of each key."""
+    return tuple((name, field, block_of(field)) for name, field in block.model_fields.items())
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:

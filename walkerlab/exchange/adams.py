@@ -1,8 +1,8 @@
 """ADAMS export of a walker: a dataset (.adm) with the commands (.acf) that run it, or the commands (.cmd) that build
 the same objects in ADAMS View.
 
-Commands have the order in which View writes them: parts with their markers, joints, contacts, forces, and finally all
-functions, because a function may refer to any object.
+Commands are in the order in which View writes them: parts with their markers, joints, contacts and forces. All
+functions come last, because a function may refer to any object.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -103,7 +103,8 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
-    # Only the moment about the plane's normal matters to the walk. Three equal moments are those of a possible body.
+    # Only the moment about the normal of the plane matters to the walk. ADAMS needs three, and a body with three equal
+    # moments can exist.
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 
@@ -132,7 +133,7 @@ def contact_arguments(contact: AdamsContact, ids: Mapping[str, int]) -> Iterator
 
 
 def command_text(model: AdamsModel, dataset: str, end_s: float, pinned_until_s: float | None) -> str:
-    """Write the commands of `AdamsModel.commands`, which simulate walkerlab's walk, with a header."""
+    """Write the command file that simulates walkerlab's walk: a header, and the commands of `AdamsModel.commands`."""
     head = [
         dataset,
         dataset.removesuffix(".adm"),
@@ -147,7 +148,7 @@ Naming = Callable[[str], str]
 def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until_s: float | None = None) -> str:
     """Write the commands that build a model, with a header comment and a script that simulates it up to an end time.
 
-    pinned_until_s  time (s) at which to remove the pin at the first stance foot; None if there is no pin
+    pinned_until_s  time (s) at which to remove the pin at the first stance foot, or None if there is no pin
     """
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     commands = ", ".join(map(quote, model.commands(end_s, pinned_until_s)))

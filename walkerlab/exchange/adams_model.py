@@ -1,7 +1,8 @@
-"""Walker as ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
+"""Description of a walker by ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
 
 The walk takes place in the x-y plane, x along the slope and y normal to it. Gravity is tilted.
-Expressions name markers and variables in braces, as in DX({leg_1.foot}). Each file format replaces them by its names.
+Expressions have markers and variables in braces, as in DX({leg_1.foot}). Each file format puts its names in their
+place.
 """
 
 import math
@@ -27,13 +28,14 @@ GROUND = "ground"
 ORIGIN = "ground.origin"
 BELOW = "ground.below"
 FREE_LENGTH_MM = 100.0
-"""Free length in IMPACT for a point foot, and depth in the ground of the marker from which foot heights are measured.
+"""Free length in IMPACT for a point foot. The marker from which foot heights are measured is at this depth in the
+ground.
 """
 PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
 FRICTION_NAMES = ("mu_static", "mu_dynamic", "stiction_transition_velocity", "friction_transition_velocity")
-"""Names in ADAMS of the fields of `Coulomb`, in the same order."""
+"""ADAMS names for the fields of `Coulomb`, in the same order."""
 REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
@@ -64,7 +66,7 @@ class Part:
     velocity: tuple[float, float]  # velocity of the centre of mass
     spin: float
     mass: float
-    centre: str  # marker at the centre of mass
+    centre: str  # name of the marker at the centre of mass
     inertia: float
 
 
@@ -143,7 +145,7 @@ class AdamsModel:
     parts: dict[str, Part] = field(default_factory=dict)
     markers: dict[str, Marker] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
-    couplers: dict[str, dict[str, float]] = field(default_factory=dict)  # weight of each joint
+    couplers: dict[str, dict[str, float]] = field(default_factory=dict)  # weights of joints by coupler
     shapes: dict[str, Shape] = field(default_factory=dict)
     outlines: dict[str, tuple[str, ...]] = field(default_factory=dict)
     contacts: dict[str, AdamsContact] = field(default_factory=dict)
@@ -171,8 +173,8 @@ class AdamsModel:
     def commands(self, end_s: float, pinned_until_s: float | None) -> Iterator[str]:
         """Yield the solver commands that simulate the walk, also for a script of Adams View.
 
-        end_s           end of walkerlab's walk
-        pinned_until_s  time at which a pinned stance foot is released; None if no foot is pinned
+        end_s           end of walkerlab's walk (s)
+        pinned_until_s  time (s) at which a pinned stance foot is released, or None if no foot is pinned
         """
         run = f"simulate/dynamic, end = {{}}, dtout = {finite(OUTPUT_S)}"
         if pinned_until_s is not None:
@@ -180,7 +182,7 @@ class AdamsModel:
         yield from (self.switch("deactivate", name) for name in self.inactive)
         for event in self.events:
             yield self.switch("activate", event.sensor)
-            # More time than the walk took, so that a slower walk still reaches its last event.
+            # Simulate longer than the walk took, so that a slower walk still reaches its last event.
             yield run.format(finite(TIME_FACTOR * end_s))
             yield from (self.switch("deactivate", name) for name in (event.sensor, *event.deactivated))
             yield from (self.switch("activate", name) for name in event.activated)
@@ -288,8 +290,8 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         part, (x, y, _) = model.parts[foot_on_ground.part], model.markers[foot_on_ground.marker].place
         place = MovingFrame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
         model.markers[f"{GROUND}.pin"] = Marker(GROUND, (*place, 0.0))
-        # Together with the planar joint of the base, a hinge would hold the foot in the plane twice. INLINE only fixes
-        # the point.
+        # The planar joint of the base already holds the foot in the plane. A hinge would do so again, but INLINE only
+        # fixes the point.
         model.joints["pin"] = Joint("INLINE", foot_on_ground.marker, f"{GROUND}.pin")
 
 
@@ -314,12 +316,14 @@ class FootTerms:
         return MM * float(self.export.scene.ours.whole.radius[self.foot])
 
     def place(self, base: str = ORIGIN) -> str:
-        """Return the arguments of ADAMS functions that measure the foot's position relative to the marker `base`."""
+        """Return the arguments for ADAMS functions that measure the position of the foot relative to the marker
+        `base`.
+        """
         return f"{{{self.marker}}},{{{base}}},{{{ORIGIN}}}"
 
     @property
     def motion(self) -> str:
-        """Arguments of ADAMS functions that measure the velocity of the foot relative to the ground."""
+        """Arguments for ADAMS functions that measure the velocity of the foot relative to the ground."""
         return f"{self.place()},{{{ORIGIN}}}"
 
     @property
@@ -341,7 +345,7 @@ class FootTerms:
         lane = round(terrain.lanes[self.foot] / terrain.pitch)
         shift = MM * self.export.lane_shift_m(self.foot)
         along = f"(DX({self.place()}){-shift:+.17g})" if shift else f"DX({self.place()})"
-        # The cosine is positive on the pads, which are one pitch long and two pitches apart.
+        # The cosine is positive on the pads, because they are one pitch long and two pitches apart.
         wave = f"{'-' if lane % 2 else ''}COS(PI*{along}/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
@@ -430,7 +434,8 @@ def friction_function(leg: str, law: Coulomb) -> str:
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
-    # The first STEP stays at mu or -mu beyond v. The second one adds the fall to the dynamic coefficient.
+    # Beyond the stiction velocity, the first STEP stays at mu or -mu. The second one adds the fall to the dynamic
+    # coefficient.
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 
@@ -448,8 +453,8 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
             begin = finite(time)
             end = finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
-            # Scaled to a unit impulse: a leg without push-off needs the pulse, too, because its knee is held while it
-            # lasts.
+            # The pulse has a unit impulse. A leg without push-off needs it as well, because its knee is held during the
+            # pulse.
             force = finite(30.0 / duration)
             model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
         marker = f"{{{export.names[0]}.hinge}},{{{foot.marker}}},{{{ORIGIN}}}"
@@ -492,9 +497,9 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.damping_N_m_s_per_rad:
         terms.append(f"-{finite(MM * hip.damping_N_m_s_per_rad)}*WZ({{{i}}},{{{j}}},{{{j}}})")
     if hip.torque_N_m:
-        # Each factor changes its sign at one touchdown, so the product does at all of them.
+        # Each factor changes its sign at one touchdown, so the product changes its sign at every touchdown.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
-        # ADAMS rejects most line breaks within an expression, so a long one is divided into variables.
+        # ADAMS rejects most line breaks within an expression, so divide a long one into variables.
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
         for number, group in enumerate(groups):
             model.variables[f"leg_that_swings_{number + 1}"] = group
@@ -507,13 +512,13 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
 def add_knees(model: AdamsModel, export: Exported) -> None:
     """Add stops and locks of the knees, and the events of walkerlab's walk that switch them.
 
-    An ADAMS function has no memory, and a command file no branches. So the run waits for one sensor after the other, in
-    the order of walkerlab's walk. Other sensors halt it if the walker falls or comes down on a bent knee.
+    An ADAMS function has no memory, and a command file has no branches. So the run waits for one sensor after another,
+    in the order of walkerlab's walk. Other sensors halt it if the walker falls or comes down on a bent knee.
     """
     law = knee_rules(export.config.walker).stop
     assert isinstance(law, Impact), "the export has a compliant stop"
-    # IMPACT acts where its argument is below the free length. With a free length of 1 rad and the argument 1 - angle,
-    # that is where the knee is beyond straight.
+    # IMPACT acts if its argument is below the free length. With a free length of 1 rad and the argument 1 - angle, it
+    # acts when the knee is beyond straight.
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
@@ -524,7 +529,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         down_ahead = Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM)
         sinking = f"VY({foot.motion})"
         if f"{other}_pulses" in model.variables:
-            # A value of -1 keeps the trailing knee locked during the push-off.
+            # The value -1 keeps the trailing knee locked during the push-off.
             sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
         model.sensors |= {f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM), f"{leg}_touches": down_ahead}
         if number >= len(export.knee_links):
@@ -546,7 +551,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     hip = f"{{{export.names[0]}.hinge}}"
     lowest = FALLEN_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
-    # Leg 1 swings first, so of the locks only that of leg 2 is active at the start.
+    # Leg 1 swings first, so only the lock of leg 2 is active at the start.
     model.inactive = (
         *(stop for stop in ("stop_1", "stop_2") if stop in model.torques),
         "lock_1",

@@ -1,4 +1,6 @@
-"""Map the columns of a recording to quantities of a walk in SI units, by name, by suffix or as the user specifies."""
+"""Find the quantities of a walk among the columns of a recording, and convert them to SI units. A column is found by
+its name, by the end of its name, or as the user specifies.
+"""
 
 import math
 import re
@@ -39,15 +41,17 @@ WALKER_QUANTITIES: Final = {
 QUANTITY_KINDS: Final = WALKER_QUANTITIES | {
     f"{name} {leg}": kind for name, kind in LEG_QUANTITIES.items() for leg in (1, 2)
 }
-"""Kind of unit by quantity. Names of quantities of a leg end in its number, 1 or 2."""
+"""Kind of unit of each quantity. If a quantity belongs to a leg, its name ends in 1 or 2."""
 NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Quantity: position (m) of the upper marker of the first line along the walk, if angles are those of lines."""
+"""Name of a quantity: position (m) along the walk of the upper marker of the first line, if angles are those of
+lines.
+"""
 SAMPLE: Final = "sample"
-"""Quantity: number of each sample in the file, counted from 1."""
+"""Name of a quantity: number of each sample in the file, counted from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
 SIGN_AND_OFFSET: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
 """Pattern for a column with an optional minus sign and an added constant, such as -NAME+90deg."""
@@ -67,13 +71,13 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)  # by quantity: why its column is not used
-    walks: str = ""  # stated direction of the walk; '' to find it
+    left_out: dict[str, str] = field(default_factory=dict)  # reason, by quantity, why a column is not used
+    walks: str = ""  # stated direction of the walk, or '' if it has to be found
     unit_is_stated: bool = True  # whether the file or the user states the unit of the leg angles explicitly
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
     doubts: tuple[str, ...] = ()  # oddities of the recording, and how they were handled
     gaps: str = ""  # description of samples within the walk that are left out because values are missing
-    tilt_rad: float = 0.0  # forward lean of the direction from which angles are measured
+    tilt_rad: float = 0.0  # forward lean (rad) of the direction from which angles are measured
     belt_m_s: float = 0.0  # speed of a treadmill's belt
     hip_is_in_m: bool = False  # whether the position of the upper marker is in a known unit
 
@@ -103,7 +107,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
     recording, notes = set_frame_times(recording, asked)
-    # The frame rate has replaced the times of the file, so a unit stated for them does not apply.
+    # The frame rate has replaced the times of the file, so a unit that is stated for them does not apply.
     if FRAME_TIME in recording.columns:
         units = {name: unit for name, unit in units.items() if name != TIME}
     named = find_named(recording, asked)
@@ -147,7 +151,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     used = {name: sources[name] for name in (TIME, *values, *lines)}
-    # Samples may be left out from here on, but messages name them by their numbers in the file.
+    # From here on samples may be left out. Messages still name samples by their numbers in the file.
     values[SAMPLE] = np.asarray(1.0 + np.flatnonzero(rows))
     tilt, tilt_notes = camera_tilt(recording, asked, slope_rad)
     walk = RecordedWalk(
@@ -170,9 +174,10 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
 
 
 def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
-    """Replace the times by those of the frames if the user states a frame rate. Also return notes about the times.
+    """Compute times from frame numbers if the user states a frame rate. Also return notes about the times.
 
-    Frame numbers come from a column that counts frames, otherwise from regular times, otherwise from the sample order.
+    Frame numbers come from a column that counts frames. Without one, they come from regular times, or else from the
+    order of the samples.
     """
     if asked.fps is None or not recording.columns:
         return recording, []
@@ -186,7 +191,8 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
     elif intervals.size and (typical := float(np.median(intervals))) > 0.0:
-        # If the file leaves out frames, times are farther apart. Rounding counts the missing frames, too.
+        # If frames are missing from the file, times there are farther apart. Rounding counts the missing frames as
+        # well.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
         if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
@@ -203,7 +209,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
 def remove_unlikely_positions(
     recording: Recording, lines: Sequence[str], least: float | None
 ) -> tuple[Recording, list[str]]:
-    """Replace positions of the markers of `lines` by gaps where their likelihood is below `least`. Also return notes.
+    """Turn positions of the markers of `lines` with a likelihood below `least` into gaps. Also return notes.
 
     Raises ConfigError if the file has no likelihoods although the user gives a limit.
     """
@@ -235,7 +241,7 @@ def remove_unlikely_positions(
 
 
 def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Replace angles by gaps where they stand still for some samples and then leap.
+    """Turn angles that stand still for some samples and then leap into gaps.
 
     Software that fills gaps produces such angles.
     """
@@ -321,7 +327,7 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     """
     begin = -math.inf if asked.from_s is None else asked.from_s
     end = math.inf if asked.to_s is None else asked.to_s
-    # Written as a negation, so that samples without a time remain and are reported as gaps.
+    # The negation keeps samples without a time, which are then reported as gaps.
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
@@ -335,7 +341,8 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
 def rows_without_gaps(
     recording: Recording, sources: Iterable[str], rows: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], str, str]:
-    """Find the rows in which no source has a gap. Also describe the samples cut off at the ends, and the gaps between.
+    """Find the rows in which no source has a gap. Also describe the samples that are cut off at the ends, and the gaps
+    between them.
 
     Raises ConfigError for a column that does not contain numbers, and if every sample has a gap.
     """
@@ -411,7 +418,8 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
     columns = {column: normalise_name(column) for column in recording.columns}
     by_ending: dict[str, list[str]] = {}
     for column, name in columns.items():
-        # Names of objects precede that of a quantity. ADAMS separates them by dots, OpenSim by slashes.
+        # A column may have names of objects before that of the quantity, separated by dots in ADAMS and by slashes in
+        # OpenSim.
         for start in (0, *(match.end() for match in re.finditer(r"[./]", name))):
             by_ending.setdefault(name[start:], []).append(column)
     sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
@@ -428,7 +436,9 @@ def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[st
 
 
 def leg_names(name: str) -> list[str]:
-    """Return the name of a leg quantity in exported models, e.g. leg_1.angle for 'angle 1', or '' for others."""
+    """Return the name that exported models give a leg quantity, such as leg_1.angle for 'angle 1', or '' for other
+    quantities.
+    """
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', normalise_name(quantity))}"] if blank else []
 
@@ -487,9 +497,8 @@ def named_column(recording: Recording, name: str) -> str:
 
 
 def columns_of(recording: Recording, source: str) -> list[str]:
-    """Return the columns that a source needs: one, or the coordinates of both ends of a line.
-
-    Raises ConfigError if absent.
+    """Return the columns that a source needs: one, or the coordinates of both ends of a line. Raises ConfigError if one
+    is missing.
     """
     if pairs := ends_of(recording, source):
         return [column for pair in pairs for column in pair]
@@ -628,7 +637,7 @@ def rate_unit(units: Mapping[str, str], kind: str) -> str:
 
 
 def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> Line:
-    """Return the positions (samples, axes) of both ends of a line: in m, or as recorded if their unit is unknown."""
+    """Return the positions (samples, axes) of both ends of a line in m, or as recorded if their unit is unknown."""
     scale = scale_of_line(recording, pairs, units) or {}
     top, bottom = (
         np.stack([recording.columns[column] * scale.get(column, 1.0) for column in end]).T
@@ -662,7 +671,9 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by kind, quantity or column. A unit alone, such as `deg`, applies to its kind (angles)."""
+    """Return units by kind, quantity or column. A unit without a name, such as `deg`, applies to all quantities of its
+    kind.
+    """
     pairs = []
     alone = {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):

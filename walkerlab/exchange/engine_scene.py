@@ -1,4 +1,4 @@
-"""Scene for other programs: a walker's parts, its start, and a linear approximation of its contact."""
+"""Scene for other programs: parts and start of a walker, and a linear approximation of its contact."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,7 +16,7 @@ from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_poin
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-# Ratio of tangential to normal force of a standing foot, about the mean over a walk.
+# Ratio of tangential to normal force of a standing foot. It is about the mean over a walk.
 CREEP_LOAD = 0.1
 
 
@@ -28,7 +28,7 @@ class EngineScene:
     base: Anchor  # root of the engine's tree: the hip point of the first stance leg
     ours: ContactWalker  # the walker in walkerlab's contact model
     walker: ContactWalker  # the same walker, with the levers of feet and hip measured from the base
-    ground: JudgedGround  # terrain, and the walker's dimensions by which the walking rules judge a walk
+    ground: JudgedGround  # terrain, and the dimensions of the walker by which the walking rules judge a walk
     start: State  # start of the walk, a state of the free walker (not pinned to the ground)
     locked: tuple[Knee, ...] = ()  # locked knees, which have no hinge in the engine
 
@@ -59,9 +59,8 @@ class EngineScene:
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Vectors (bodies, 2) in m, in the frames of the bodies.
-
-        Rotated by the angles of the bodies and summed, they lead from the base to the centre of mass.
+        """Vectors (bodies, 2) in the frames of the bodies (m). If each is rotated by the angle of its body, their sum
+        leads from the base to the centre of mass.
         """
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
@@ -74,7 +73,7 @@ class EngineScene:
         shift, drift = self._centre(angles, rates)
         position = np.array(y[:2]) - shift
         velocity = np.array(y[2 + n : 4 + n]) - drift
-        # Bodies of a locked leg have equal rows. So there may be more equations than angles, but they are consistent.
+        # Bodies of a locked leg have equal rows, so there may be more equations than angles. They are consistent.
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
@@ -94,7 +93,9 @@ class EngineScene:
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def scale_start(self, factor: float) -> "EngineScene":
-        """Return the scene with the initial velocities multiplied by `factor`. The stance foot still does not slip."""
+        """Return the scene with the initial velocities multiplied by `factor`, and adjusted so that the stance foot
+        does not slip.
+        """
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
@@ -104,7 +105,7 @@ def engine_scene(
 ) -> EngineScene:
     """Build the scene of a config without pinned foot or locked knees. `pad_pitch: own` becomes the rigid step length.
 
-    asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
+    asymmetry  difference between the step lengths of the rigid gait over their mean, which shifts the lanes of pads
     """
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m, asymmetry)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
@@ -139,7 +140,7 @@ class EngineContact:
 
 def creep_velocity(friction: FrictionLaw, load: float) -> float:
     """Return the slip velocity (m/s) at which friction carries `load`, a ratio of tangential to normal force."""
-    # Bisect down to neighbouring floats: importing a library's root finder would take too long for an export.
+    # Bisect down to neighbouring floats, because importing the root finder of a library would slow down an export.
     low, high = 0.0, friction.rising_until
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if -friction_coefficient(friction, middle)[0] < load else (low, middle)
@@ -147,7 +148,7 @@ def creep_velocity(friction: FrictionLaw, load: float) -> float:
 
 
 def contact_target(scene: EngineScene) -> EngineContact | None:
-    """Linearise the contact of a walker that stands on one foot, or return None for frictionless ground."""
+    """Linearise the contact of a walker that stands on one foot. Return None for frictionless ground."""
     walker = scene.ours
     friction = walker.friction
     if friction.largest == 0.0:

@@ -29,7 +29,7 @@ ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "m
 
 @dataclass(frozen=True)
 class ExportedFiles:
-    """Exported texts by file name, the model first, and descriptions of what they leave out."""
+    """Exported texts by file name, beginning with the model, and descriptions of what they leave out."""
 
     files: dict[str, str]
     left_out: tuple[str, ...]
@@ -55,7 +55,7 @@ def export_model(
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
-    # MuJoCo's script simulates the plastic impact itself.
+    # With MuJoCo, the exported script simulates the plastic impact, so no stop is needed.
     locked = config if kind == "mjcf" else add_stops(config)
     export = prepare_export(locked, start)
     stem = stem or export.model_name
@@ -103,8 +103,8 @@ def parse_slope(text: str) -> Slope:
 def add_stops(config: Config) -> Config:
     """Return a config in which a stop brings each knee to rest before it locks.
 
-    When a joint is activated, ADAMS changes velocities by rules that are not ours. If the knee is at rest, they change
-    nothing.
+    When a joint is activated, ADAMS changes velocities by other rules than ours. If the knee is at rest, they have no
+    effect.
     """
     walker = config.walker
     if not isinstance(walker, Kneed) or walker.knee.lock == "compliant":

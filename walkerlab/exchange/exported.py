@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 PADS_BEHIND = 2
 PADS_AHEAD = 4
 RESERVED = ("ground", "world", "walker")
-MIN_WEIGHT = 1e-12  # smaller weights of a coupling count as zero
+MIN_WEIGHT = 1e-12  # weights of a coupling below this count as zero
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Exported:
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
-            # There are more choices than links, so at least one is free.
+            # There are more candidate names than links, so at least one is not in use.
             choices = (name, *(f"{name}_{number}" for number in range(2, len(self.model.links) + 3)))
             names.append(next(choice for choice in choices if choice not in (*names, *RESERVED)))
         return tuple(names)
@@ -112,7 +112,7 @@ class Exported:
         """Weights of hinge angles, by link, for each body that follows others. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
-            # Only if the weights add up to 1 does the base's angle drop out, so that relative angles suffice.
+            # Relative angles suffice only if the weights add up to 1, because then the angle of the base drops out.
             if abs(row[0]) > MIN_WEIGHT:
                 raise ConfigError(
                     "A body whose coupling weights do not add up to 1 cannot be exported.",
@@ -123,7 +123,9 @@ class Exported:
 
     @cached_property
     def pads(self) -> tuple[Pad, ...]:
-        """Ground under the feet: one floor per foot, or pads from behind the start to beyond the end of the walk."""
+        """Ground under the feet: one floor for each foot, or pads from behind the start to beyond the end of
+        the walk.
+        """
         terrain = self.scene.ground.terrain
         pitch = terrain.pitch
         last = self.steps + PADS_AHEAD
@@ -169,7 +171,7 @@ class Exported:
     def describe(self, left_out: Iterable[str], commit: str | None, tilted: str) -> Iterator[str]:
         """Yield the header of an exported file: origin, slope, walkerlab's walk for comparison, and omissions.
 
-        tilted  what is tilted to express the slope
+        tilted  what the file tilts to express the slope
         """
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
         yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted {tilted}."

@@ -35,7 +35,7 @@ from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.parts import knee_dampings
 
-# kg m^2, twice the minimum that MuJoCo accepts
+# kg m^2; twice the minimum that MuJoCo accepts
 MIN_INERTIA = 2e-15
 # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
 IMPEDANCE = 1e-3
@@ -49,7 +49,7 @@ DAMPED_STEP = 0.33
 """Maximum time step as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
-"""Settings that make couplings and locks as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
+"""Settings that make couplings and locks as stiff as constraints in MuJoCo can be with time steps of STEP_S."""
 TIGHT_SOLVER = 'iterations="100" tolerance="1e-12"'
 
 
@@ -83,7 +83,8 @@ UNNAMED: Mapping[int, Hinge] = {}
 
 
 def contact_settings(target: EngineContact) -> dict[str, float]:
-    """Compute the settings that tune MuJoCo's contact to the target, by the formulas at the top of this module.
+    """Compute the settings with which MuJoCo's contact reproduces the target, by the formulas at the top of this
+    module.
 
     Exports and engines use the same settings for every foot. `foot_text` and `pair_text` turn them into a solref.
     Raises ConfigError for a target without damping.
@@ -126,7 +127,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
     centres: list[Floats] = []
     mass_matrix = np.zeros((model.size, model.size))
     for number, link in enumerate(model.links):
-        # velocity along the ground and normal to it, and rate of turning (3, coordinates), of each link at its hinge
+        # for each link, (3, coordinates) velocity of its hinge along and normal to the ground, and rate of turning
         hinge = np.zeros((3, model.size))
         if link.parent < 0:
             hinge[:, : len(model.freedoms)] = base_rates
@@ -164,12 +165,13 @@ def body_text(
     """Write a link with its hinge, feet and child links.
 
     contact  settings of the foot contacts; None for a walker without feet
-    hinges   hinges with a name, by the link that hangs from them
+    hinges   hinges that have a name, by the link below the hinge
     """
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = "".join(joint_texts(model, link_number, hinges.get(link_number)))
-    # Only the moment about the y axis matters to the walk. Three equal moments are those of a possible body.
+    # Only the moment about the y axis matters to the walk. MuJoCo needs three, and a body with three equal moments can
+    # exist.
     i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     for ball, foot in zip(model.balls, feet, strict=False):
@@ -186,7 +188,7 @@ def body_text(
 
 
 def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> Iterator[str]:
-    """Yield the joints of a link: one for each freedom of the base, or the hinge between a link and its parent."""
+    """Yield the joints of a link. The base has one for each freedom, and other links have the hinge to their parent."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):
@@ -197,7 +199,7 @@ def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> It
 
 
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
-    """Write a foot with contact settings for any ground that is added to the file later.
+    """Write a foot. Its contact settings are for ground that is added to the file later.
 
     The contacts with ground in the file itself are set by `pair_text`.
     """
@@ -223,7 +225,7 @@ def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: 
 
 
 def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) -> str:
-    """Write spring and damper of a foot: the contact settings times the inverse weight of the foot's link."""
+    """Write spring and damper of a foot, which are the contact settings times the inverse weight of its link."""
     inverse_weight = inverse_weights(model).bodies[ball.link]
     d = contact["solimp_d"]
     stiffness = inverse_weight * contact["stiffness_N_m"]
@@ -232,7 +234,7 @@ def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) ->
 
 
 def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity") -> str:
-    """Write a model with pads and a keyframe `gait`, from which a passive compass walks under plain `mj_step`.
+    """Write a model with pads and a keyframe `gait`. From there, a passive compass walks with nothing but `mj_step`.
 
     head   lines of the header comment
     slope  whether gravity is tilted, or the ground with everything on it
@@ -253,7 +255,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot), limbs(export, foot)) for foot in range(2)
     )
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
-    # far enough from the plane of the walk to show a whole step
+    # The camera is far enough from the plane of the walk to show a whole step.
     distance = -4.0 * export.config.walker.leg_length_m
     scene = "".join(
         (
@@ -394,13 +396,13 @@ def coupling_texts(export: Exported) -> Iterator[str]:
         *before, last = (HIP if link == export.hip_link else f"hinge of {export.names[link]}" for link in coupling)
         weights = list(coupling.values())
         follows = f'joint2="{before[0]}" ' if before else ""
-        # The weighted sum of both angles is zero.
+        # MuJoCo's form of the constraint: the weighted sum of both angles is zero.
         weight = -weights[0] / weights[-1] if before else 0.0
         yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {COUPLING_SETTINGS}/>'
 
 
 def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
-    """Describe the properties of the contact law that MuJoCo's contact reproduces, and those that it lacks."""
+    """Describe which properties of the contact law MuJoCo's contact reproduces, and which it lacks."""
     static = float(export.scene.ours.friction.largest)
     yield (
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "

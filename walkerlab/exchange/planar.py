@@ -13,7 +13,7 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 PINNED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-# As a multiple of mass x length^2. Engines reject bodies without inertia.
+# Smallest inertia, as a multiple of mass x length^2, because engines reject bodies without inertia.
 SMALLEST_INERTIA = 1e-13
 # Radius of the ball that replaces a point foot in engines. It must exceed the penetration.
 SMALLEST_BALL_M = 5e-4
@@ -21,10 +21,10 @@ SMALLEST_BALL_M = 5e-4
 
 @dataclass(frozen=True)
 class Link:
-    """Rigid link, lumped from bodies that move together and the particles on them.
+    """Rigid link that combines bodies that move together, and the particles on them.
 
-    parent_point_m  hinge in the frame of the parent (m); for the base, the origin of the world
-    point_m         hinge in the frame of the link (m); for the base, the point that the freedoms move
+    parent_point_m  hinge in the frame of the parent (m), or the origin of the world for the base
+    point_m         hinge in the frame of the link (m), or the point that the freedoms move for the base
     """
 
     name: str
@@ -43,7 +43,7 @@ class Ball:
     link: int
     centre_m: Position
     radius_m: float
-    ground_m: float  # height of the ground; under the tiny ball of a point foot it is lower by the ball's radius
+    ground_m: float  # height of the ground (m), which is lower by the radius under the tiny ball of a point foot
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,8 @@ class PlanarModel:
     balls: tuple[Ball, ...]  # feet
     gravity_along: float
     gravity_down: float
-    chain: Floats  # (bodies, links) maps relative angles (base first) to the absolute angles of the assembly's bodies
+    # (bodies, links) matrix from relative angles (base first) to the absolute angles of the bodies of the assembly
+    chain: Floats
 
     @property
     def size(self) -> int:
@@ -80,7 +81,8 @@ def planar_model(
     """
     root = base.body
     welded = [{knee.thigh, knee.shank} for knee in welds]
-    # By link: the bodies with their origins in the frame of the link (m), and the parent with the hinge in both frames.
+    # For each link: the bodies with their origins in the frame of the link (m), and the parent with the hinge in both
+    # frames.
     members: list[list[tuple[str, Position]]] = [[(root, (0.0, 0.0))]]
     hinges: list[tuple[int, Position, Position]] = [(-1, (0.0, 0.0), base.at_m)]
     frames: dict[str, tuple[int, Position]] = {root: (0, (0.0, 0.0))}

@@ -31,9 +31,9 @@ CHECKSUM_BYTES = 32  # length of the SHA-256 digest that precedes a kernel's sto
 # index of the signature in the stored tuple
 SIGNATURE = 3
 # The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit;
-# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, without a test for an
-# exception. No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting
-# would take as long as the arithmetic.
+# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, so that divisions
+# need no test. References are not counted (_nrt), because kernels allocate nothing and borrow arrays from their caller,
+# and counting would take as long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 bodies: dict[type, list[Callable[..., Any]]] = {}
 """Functions that compiled code calls for a class, by class (see `kernels.ByType`)."""
@@ -42,7 +42,7 @@ files_in_use: set[str] = set()
 
 
 def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
-    """Return the name of a record type in the symbols of machine code. It is the same in every process."""
+    """Return the name that symbols of machine code use for a record type. It is the same in every process."""
     # Numba uses a counter instead. Two processes can then give the same symbol to code compiled for different records,
     # and a third process that loads both would run the wrong code.
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
@@ -108,7 +108,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             files_in_use.add(name)
 
     def file_name(self, signature: Any) -> str:
-        """Return the cached file's name for these argument types, with a hash of all code outside the kernels."""
+        """Return the cached file's name for these argument types, with a hash of what the folder's name leaves out."""
         function = self.py_func
         location = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""
@@ -139,8 +139,8 @@ def read_code(path: Path) -> Any:
 
 
 def strip_bitcode(path: Path) -> bytes:
-    """Return the content of a kernel's file with its LLVM bitcode, most of the file, reduced to the symbol names."""
-    # Only linking needs the bitcode itself, and stored kernels are never linked.
+    """Return the content of a kernel's file without its LLVM bitcode, of which only the symbol names are kept."""
+    # The bitcode is most of the file. Only linking needs it, and stored kernels are never linked.
     (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)
     names = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
@@ -149,15 +149,15 @@ def strip_bitcode(path: Path) -> bytes:
 
 
 def classes_named_by(fields: Iterable[str]) -> Iterator[Any]:
-    """Yield the classes that fields of a record type name as "module/class"."""
-    # The separator is no colon, because other libraries cannot read NumPy's records if the name of a field has one.
+    """Yield the classes that are named by fields of a record type, as "module/class"."""
+    # The separator is not a colon, because other libraries cannot read NumPy records with a colon in a field's name.
     for module, slash, name in (field.partition("/") for field in fields):
         if slash:
             yield getattr(importlib.import_module(module), name)
 
 
 def classes_in(kind: Any) -> Iterator[type]:
-    """Yield the NamedTuple classes in a Numba type or in a tuple of types, and those that records name."""
+    """Yield the NamedTuple classes in a Numba type or in a tuple of types, and those named by record types."""
     yield from classes_named_by(getattr(getattr(kind, "dtype", kind), "fields", ()))
     if hasattr(kind, "instance_class"):
         yield kind.instance_class

@@ -181,7 +181,7 @@ def _refusal(root: Path) -> str:
         make_private_folder(root)
         folder = root.resolve()
         generations = list(folder.glob("kernels-*"))
-        # Others may need a folder that contains anything else, so its permissions must stay as they are.
+        # If the folder contains anything else, others may need it, so its permissions must stay as they are.
         if is_own(folder.stat()) and len(generations) == len(list(folder.iterdir())):
             folder.chmod(0o700)
         if may_be_foreign(folder):
@@ -210,7 +210,7 @@ def cache_folder() -> Path:
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
-        # There can be too many folders only after a new one.
+        # There can be too many folders only after one was created.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     # `_remove_unused` reads the time of the last use from the folder's time of change.
     os.utime(folder)
@@ -236,7 +236,7 @@ def _closed_to_others(folder: Path) -> Path:
 
 
 def _remove_unused(generations: list[Path]) -> None:
-    """Delete folders unused for a long time, except the latest few. A process that still uses one compiles again."""
+    """Delete folders unused for a long time, except the latest few. A process that still needs one compiles again."""
     last_used: dict[Path, float] = {}  # s since the epoch
     for folder in generations:
         with contextlib.suppress(OSError):  # another process may have deleted it

@@ -24,7 +24,7 @@ C = TypeVar("C", bound=type)
 
 
 def kernel(function: F) -> F:
-    """Compile `function` on its first call and keep the machine code on disk. Kernels can call it."""
+    """Compile `function` on its first call and keep the machine code on disk. Other kernels can also call it."""
     if numba.config.DISABLE_JIT:
         return function
     return cast(F, Kernel(function, targetoptions={"nopython": True, **FLAGS}))

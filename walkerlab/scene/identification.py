@@ -522,7 +522,8 @@ def gain_of_freeing(
     count = len(keys)
     step = evaluate(rows, fitted.noise).move
     if np.abs([*step[:count], step[-1] if other.value else 0.0]).max() < LINEAR_MOVE:
-        free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
+        noise, _ = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise, fitted.noises)
+        free = evaluate(rows, noise)
         return float(free.likelihood - fitted.evaluation.likelihood), float(free.move[-1])
     if not other.measured or subject.model != RIGID:
         return 0.0, 0.0
@@ -584,8 +585,15 @@ def fixed_keys(subject: ModelUnderTest, question: Identify) -> list[str]:
     """Return the keys of the parameters that the model reads and that are not estimated."""
     config = subject.config
     estimated = {parameter_of(key, config).path for key in question.keys}
-    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
-    return [key for key in others if model_reads(subject.model, config, key)]
+    model_config = config_with(config, (), ())
+    assert model_config is not None, "the config is valid"
+    return [key for key in keys_read_by(subject.model, model_config) if parameter_of(key, config).path not in estimated]
+
+
+@lru_cache
+def keys_read_by(model: str, config: Config) -> tuple[str, ...]:
+    """Return the keys of the parameters that a model reads."""
+    return tuple(key for key in parameter_keys(config) if model_reads(model, config, key))
 
 
 def fixed_parameters(

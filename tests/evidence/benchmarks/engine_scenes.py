@@ -20,7 +20,7 @@ LIMPING_ASYMMETRY = -0.023301283643594035
 
 @cache
 def limping():
-    """The paper's compass whose leg 2 weighs 5.5 kg, on pads of each foot."""
+    """Return the scene of the paper's compass with a leg 2 of 5.5 kg. Each foot has pads at its own footholds."""
     config = load(None, (HEAVIER_LEG,)).config
     return supported_scene(config, LIMPING_STEP_LENGTH, LIMPING_GAIT, LIMPING_ASYMMETRY)
 
@@ -34,7 +34,7 @@ ONE_KNEE_GAIT = (
 
 @cache
 def one_knee():
-    """The walker whose leg 1 has a knee and whose leg 2 has none."""
+    """Return the scene of the walker that has a knee in leg 1 and none in leg 2."""
     config = load(Path("one-knee"), (ONE_KNEE_GROUND,)).config
     return supported_scene(config, 0.42478605569498096, ONE_KNEE_GAIT, 0.05797768479511639)
 

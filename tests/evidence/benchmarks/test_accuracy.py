@@ -62,7 +62,7 @@ def test_two_methods_agree_on_the_reference_to_rounding(reference):
 
 
 def test_reference_without_taylor_series_also_has_two_methods():
-    """Neither is then the Taylor method: the closed form is that of a compass."""
+    """Neither of them is the Taylor method, whose closed form is for a compass only."""
     reference = reference_for(replace(TRIAL, compass=None, steps=1))
     assert {reference.first.method, reference.second.method} == {"dop853", "radau5"}
     assert reference.agreement < 1e-10
@@ -184,7 +184,7 @@ def test_interrupted_measurement_keeps_its_references(tmp_path):
 
 
 class SlowAtFirst:
-    """A trial whose first run of all takes much longer, as one that compiles does."""
+    """A trial whose very first run takes much longer, as if it compiled."""
 
     name, methods = "rigid", ("dop853",)
 

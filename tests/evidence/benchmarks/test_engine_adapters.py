@@ -54,7 +54,7 @@ def test_swings_in_an_engine_converge_at_the_stated_order(engine, walker):
 def test_energy_drift_is_bounded_by_the_swing_error(engine):
     for name, entry in engine.adapter().INTEGRATORS.items():
         error, drift = swing(engine, name, 1e-3, 1e-8 if entry.adapts else None)
-        # at most 25 kg m^2/s^2 per unit of angle or velocity
+        # the energy changes by at most 25 kg m^2/s^2 per unit of angle or velocity
         assert drift < 25.0 * error + 1e-12, name
 
 
@@ -66,7 +66,7 @@ def test_ball_rests_at_the_depth_given_by_the_contact_law(engine):
 
 
 def test_block_creeps_and_slides_according_to_the_friction_law(engine):
-    """Compare with closed forms. A convex friction cone, which lifts a sliding block, has another one."""
+    """Compare with closed forms. The one for a convex friction cone differs, because it lifts a sliding block."""
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         bench = TuningTask(engine.name, contact, target, 1e-4, 1.5)
@@ -94,7 +94,9 @@ def test_mujoco_gives_both_feet_of_a_kneed_walker_the_same_spring(locked):
 
 @pytest.mark.parametrize(("walker", "until"), [(kneed, 0.4), (one_knee, 0.6)])
 def test_knee_locks_in_an_engine_as_in_walkerlab(engine, walker, until):
-    """Compare the engine's own swing with a free knee, its lock, and its own swing with one body less."""
+    """Compare three parts of the engine's own walk: the swing with a free knee, the lock, and the swing with one body
+    less.
+    """
     scene = walker()
     truth = simulate(scene, "radau5", 1e-10, 1, until)
     name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
@@ -119,16 +121,15 @@ DRIVES = {
 
 @pytest.mark.parametrize("drives", [*DRIVES, "legs that differ"])
 def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
-    """Compare the walk up to and through the first touch.
-
-    Errors are of first order; their factor depends on where in a step the touch falls.
+    """Compare the walk through the first touch. Errors are of first order, with a factor that depends on where in a
+    time step the touch falls.
     """
     scene = compass(*DRIVES[drives]) if drives in DRIVES else limping()
     until = 0.8
     truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []
     name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
-    # with the coarse step, Drake's method is unstable in the first strike of the limping walker
+    # With the coarse step, Drake's method is unstable at the first strike of the limping walker.
     for step in (1.6e-4 if drives in DRIVES else 8e-5, 4e-5):
         task = WalkTask(engine.name, Stepping(name, until / round(until / step)), scene, 2, until, None, 50_000)
         answer = task.run()

@@ -16,19 +16,19 @@ from walkerlab.scene.parts import Arc, Limb, kneed_legs
 
 KNEED = kneed_legs(Limb(0.5, 0.5, 0.325, 0.01, 0.004), Limb(0.5, 0.05, 0.125, -0.01, 0.0008), 0.5, Arc())
 GRAVITY, SLOPE = 9.81, 0.0504
-# swing thigh, stance leg, swing shank: just after the heel strike of a gait
+# state of swing thigh, stance leg and swing shank just after the heel strike of a gait
 START = (-0.289, 0.188, -0.289, -0.0571481063, -1.1095873312, -0.0571481063)
 SWING_S, COARSE_S = 0.24, 4e-3
 
 
 def body_by_body(y):
-    """Angles and velocities of both thighs and both shanks, the stance leg straight."""
+    """Return angles and velocities of both thighs and both shanks, with a straight stance leg."""
     return np.array((*y[:3], y[STANCE], *y[3:], y[3 + STANCE]))
 
 
 @pytest.fixture(scope="module")
 def ours():
-    """Return the end of the swing by our rates and a library's method."""
+    """Integrate our right-hand side with a library's method, and return the state at the end of the swing."""
     model = rigid_on_slope(KNEED, GRAVITY, SLOPE)
 
     def rate(t, y):

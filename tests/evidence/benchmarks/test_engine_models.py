@@ -1,4 +1,4 @@
-"""Tests of the models that engines get, and of the judgement of their walks. They need no engine."""
+"""Tests of the models that engines get, and of the way their walks are judged. No engine is needed."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def scene(request):
 
 
 def our_samples(scene, interval_s, steps):
-    """Return our own walk, sampled as an engine with steps of `interval_s` would."""
+    """Return our walk, sampled as by an engine with a time step of `interval_s`."""
     result = simulate(scene, "radau5", 1e-9, steps, interval_s)
     return result, result.samples
 
@@ -44,7 +44,7 @@ def test_total_mass_and_its_centre_are_preserved(scene):
     model = scene.model
     assert sum(link.mass_kg for link in model.links) == pytest.approx(20.0)
     hip_leg = model.links[0]
-    # 10 kg at the hip and 5 kg half a metre below it
+    # The 10 kg are at the hip, and 5 kg half a metre below it.
     assert hip_leg.centre_m == pytest.approx((0.0, -0.5 * 5.0 / 15.0))
     assert hip_leg.inertia_kg_m2 == pytest.approx(5.0 * 10.0 / 15.0 * 0.25)
 
@@ -54,7 +54,7 @@ def test_locked_leg_is_one_body_and_released_leg_is_two():
     stance, *swing = scene.model.links
     assert [link.name for link in swing] == ["thigh 1", "shank 1"]
     assert scene.knee_indices == (4, -1)
-    # hip 0.5 kg, thigh 0.5 kg 0.325 m and shank 0.05 kg 0.625 m below the hip
+    # The hip has 0.5 kg. Below it are the thigh (0.5 kg, at 0.325 m) and the shank (0.05 kg, at 0.625 m).
     centre = -(0.5 * 0.325 + 0.05 * 0.625) / 1.05
     about_hip = 0.5 * 0.325**2 + 0.05 * 0.625**2
     assert stance.mass_kg == pytest.approx(1.05)
@@ -68,14 +68,15 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
     gait = answer_in_memory(config, "fixedpoint", MemoryResults()).summary
     scene = supported_scene(config, gait["step_length_m"], tuple(gait["state"]))
     bent, straight = (scene.model.balls[foot] for foot in (0, 1))
-    # of the swing leg in its shank's frame, of the stance leg, which is one link, in its thigh's
+    # The foot is given in the frame of the shank for the swing leg, and of the thigh for the stance leg, which is one
+    # link.
     assert bent.centre_m == pytest.approx((0.03, 0.2 - 0.5))
     assert straight.centre_m == pytest.approx((0.03, 0.2 - 1.0))
     assert {ball.radius_m for ball in (bent, straight)} == {0.2}
 
 
 def test_point_foot_next_to_a_round_one_is_refused_with_a_radius_that_works():
-    """The engines have one floor, and a point foot needs a lower one."""
+    """Engines have one floor for both feet, but a point foot would need a lower one."""
     point = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0}")).config
     with pytest.raises(ConfigError, match="the other is round") as caught:
         supported_scene(point, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
@@ -99,14 +100,14 @@ def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
 
 
 def knees_seen(scene):
-    """Return our own walk of two steps, the rules' record of it, and the changes of knees: time, places before and
-    after.
+    """Return our walk of two steps, what the rules record of it, and each change of a knee: its time, and the
+    coordinates before and after.
     """
     result, samples = our_samples(scene, 1e-4, 2)
     rules, changes = RuleFollower(scene, 2, *scene.from_base(scene.start)), []
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
         q, v = rules.scene.from_base(tuple(y))
-        q[np.abs(q) < 1e-12] = 0.0  # a knee that has just locked is straight but for rounding
+        q[np.abs(q) < 1e-12] = 0.0  # A knee that has just locked is straight up to rounding.
         before = rules.scene.knee_indices
         rules.follow(time_s, q, v)
         if rules.turn is not None:
@@ -122,12 +123,12 @@ def knees_seen(scene):
 
 def test_knees_lock_and_release_in_engines_as_in_the_contact_walk():
     result, rules, changes = knees_seen(kneed())
-    # the swing knee locks, the trailing one is released and locks in turn
+    # The swing knee locks. Then the trailing knee is released, and later it locks.
     assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
     assert changes[0][0] == pytest.approx(result.knee_strike_time_s[0], abs=1e-4)
     assert 0.0 < changes[1][0] - result.touch_time_s[0] < 2e-3
     assert changes[2][0] == pytest.approx(result.knee_strike_time_s[1], abs=1e-4)
-    # the ground stops the foot, at about 2000 m/s^2 from 0.4 m/s, within the step that the cubic spans
+    # Within the step that the cubic spans, the ground stops the foot: it decelerates from 0.4 m/s at about 2000 m/s^2.
     assert rules.walk_state.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
 
 
@@ -151,7 +152,7 @@ DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.h
 
 
 def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
-    """Compare over a twentieth of a second after the first touch."""
+    """Compare the work over the first twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
     result = walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tight, 2, 1e-5)
@@ -184,7 +185,7 @@ def test_pinned_walker_hangs_from_its_stance_foot(scene):
 
 
 def test_ground_forces_do_the_work_measured_at_the_feet(scene):
-    """Generalised forces times velocities equal the contact forces times the velocities of their points."""
+    """Compare the power of the generalised forces with that of the contact forces at the points where they act."""
     _, samples = our_samples(scene, 0.05, 3)
     for i in range(1, 20):
         q, v = scene.from_base(tuple(samples.states[i]))
@@ -209,7 +210,7 @@ def test_touches_and_slip_in_engines_are_judged_as_in_the_contact_walk(scene):
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
         rules.follow(float(time_s), *scene.from_base(tuple(y)))
     seen = rules.walk_state.touch_time[:3]
-    # the ground stops the foot, at about 700 m/s^2 from 0.27 m/s, within the step that the cubic spans
+    # Within the step that the cubic spans, the ground stops the foot: it decelerates from 0.27 m/s at about 700 m/s^2.
     bound = 700.0 * 1e-4**2 / (8.0 * 0.27)
     assert seen == pytest.approx(result.touch_time_s[:3], abs=bound)
     assert rules.walk_state.touch_along[:3] == pytest.approx(result.touch_along_m[:3], abs=bound)

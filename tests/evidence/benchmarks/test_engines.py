@@ -1,4 +1,4 @@
-"""Tests of the stage `engines`: its messages on rows, and on engines that are not installed."""
+"""Tests of the stage `engines`: messages about runs, and about engines that are not installed."""
 
 from dataclasses import dataclass, replace
 
@@ -100,7 +100,7 @@ def test_every_engine_has_an_adapter_with_one_signature():
 
 def test_speed_ratios_use_the_fastest_sufficiently_accurate_runs():
     found = ratios(ROWS)
-    # ours 5 ms at 1e-3; mujoco 0.4 s, and its run of 0.1 s is not exact enough
+    # Ours takes 5 ms at 1e-3. MuJoCo takes 0.4 s, because its run of 0.1 s is not accurate enough.
     assert found["1e-3"]["mujoco"] == pytest.approx(0.4 / 0.005)
     assert "mujoco" not in found["1e-5"]
     assert found["1e-5"]["drake"] == pytest.approx(2.0 / 0.006)
@@ -120,7 +120,7 @@ def test_contact_with_an_unfinished_walk_is_not_the_closest():
 def test_step_size_suffices_only_if_three_digits_hold_at_every_smaller_one():
     steps = three_digits(ROWS, truth())
     assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
-    # mujoco's own period is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest
+    # The period with MuJoCo's own contact is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest.
     assert steps["own-law"]["mujoco soft"] == pytest.approx(2.5e-4)
 
 
@@ -136,11 +136,11 @@ def test_converged_and_changing_periods_are_distinguished():
     rows = [replace(one, period_s=0.71252) if one.period_s == 0.7126 else one for one in rows]
     text = content(rows).summary["conclusions"]["compass"]["own-law"]
     assert "their difference is due to the model: mujoco soft by 0.01 ms." in text
-    # 4.9 and 0.6 ms off
+    # The periods are off by 4.9 and 0.6 ms.
     assert "still changes these periods: drake lagged by 4.3 ms." in text
 
 
-def test_error_ratio_of_the_last_halving_is_reported():
+def test_ratio_of_errors_over_the_last_halving_of_the_step_is_reported():
     found = content().summary["convergence"]["compass"]["same-law"]
     assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
     assert "divides the error by mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]

@@ -18,7 +18,7 @@ LOCK = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
 
 
 def sign_of(row, column, phase):
-    """Return the description and the planted sign of a wrong term."""
+    """Return the words that name a wrong sign of this term, and the field of `Knees` that plants it."""
     words = f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign {phase}"
     return words, {"signs": {(row, column, phase): -1.0}}
 
@@ -29,7 +29,7 @@ MISTAKES = {
     **mistaken_walks.STRIKE_MISTAKES,
     **mistaken_walks.SIZED_MISTAKES,
 }
-"""Planted mistakes, by words of the sentence that must name them."""
+"""Planted mistakes. The keys are words of the sentence with which a check must name them."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Knees:
     extra: tuple = (0.0, 0.0)
     keeps_rate: bool = False
     strike_radius: float | None = None
-    strike_inertia: float = 1.0  # factor on the parts' inertia in the strike
+    strike_inertia: float = 1.0  # factor by which the inertia of the parts is multiplied in the strike
     inertia: float = 1.0  # factor on the parts' inertia
     window: float = 0.0
     euler: float = 0.0
@@ -83,14 +83,14 @@ class Knees:
 
 
 def mass_matrix_and_forces(legs, angles, omega, phase):
-    """Mass matrix (3, 3) and generalised forces (3,) for thigh, stance leg and shank."""
+    """Return the mass matrix (3, 3) and the generalised forces (3,) of swing thigh, stance leg and swing shank."""
     a, b, s = angles
     mt, ms, M, R, g = legs.thigh_mass, legs.shank_mass, legs.hip, legs.radius, legs.gravity
     ct, cs, l = legs.thigh_below, legs.shank_below, legs.thigh_length
     d = legs.length - R
     It, Is = legs.inertia * legs.thigh_inertia, legs.inertia * legs.shank_inertia
-    upper = mt * ct + ms * l  # what hangs from the hip on the thigh
-    # masses that turn with the stance leg, by their height over the centre of the foot's arc
+    upper = mt * ct + ms * l  # first moment about the hip of thigh and shank
+    # masses that turn with the stance leg, times their height above the centre of the foot's arc
     heights = [(M + mt + ms, d), (mt, d - ct), (ms, d - l - cs)]
     A_bb = sum(m * (R * R + h * h + 2 * R * h * math.cos(b)) for m, h in heights) + It + Is
     half_slope = -sum(m * R * h for m, h in heights) * math.sin(b)
@@ -107,7 +107,7 @@ def mass_matrix_and_forces(legs, angles, omega, phase):
     da, db, ds = omega
     by_a = upper * (d * math.sin(a - b) + R * math.sin(a))  # dA_ab/da
     by_s = ms * cs * (d * math.sin(s - b) + R * math.sin(s))
-    # a locked shank belongs to the swing leg
+    # A locked shank is part of the swing leg.
     shank = SHANK if phase == FREE else THIGH
     force_b = -sign(STANCE, THIGH) * by_a * da**2 - sign(STANCE, shank) * by_s * ds**2 - half_slope * db**2
     force_a = sign(THIGH, STANCE) * upper * d * math.sin(a - b) * db**2
@@ -125,7 +125,9 @@ def mass_matrix_and_forces(legs, angles, omega, phase):
 
 
 def rates(legs, state, phase):
-    """Derivative of a state: angles, then rates, of thigh, stance leg and, while the knee is free, shank."""
+    """Return the derivative of a state: first the angles, then the rates of thigh, stance leg and, while the knee is
+    free, shank.
+    """
     n = len(state) // 2
     Z = np.eye(3) if n == 3 else LOCK
     matrix, forces = mass_matrix_and_forces(legs, Z @ state[:n], Z @ state[n:], phase)
@@ -133,7 +135,7 @@ def rates(legs, state, phase):
 
 
 def swing(legs, state, phase, event, counts):
-    """Time and state at which an event that counts falls to zero."""
+    """Return time and state when the event function falls to zero while `counts` is true."""
     limit = 12.0 * math.sqrt(legs.length / legs.gravity)
     if legs.euler:
         return mistaken_walks.euler(legs, state, lambda now: rates(legs, now, phase), event, counts, limit)
@@ -150,7 +152,7 @@ def swing(legs, state, phase, event, counts):
 
 
 def step(legs, start):
-    """State just after the next heel strike, the period, and the state before the strike."""
+    """Return the state just after the next heel strike, the period, and the state just before the strike."""
     bent = np.array([start[0], start[1], start[0], start[2], start[3], start[2]])
     locking, state = swing(legs, bent, FREE, lambda now: now[0] - now[2], lambda _: True)
     matrix, _ = mass_matrix_and_forces(legs, state[:3], state[3:], FREE)
@@ -161,7 +163,7 @@ def step(legs, start):
 
 
 def random_knees(generator):
-    """Return a random kneed walker, which has a gait more often than not."""
+    """Return a random kneed walker. Most of them have a gait."""
 
     def between(low, high, digits):
         return float(np.round(generator.uniform(low, high), digits))
@@ -175,7 +177,7 @@ def random_knees(generator):
 
 
 def config_of(legs):
-    """Config of the right walker, as keys."""
+    """Return the config of the walker without the mistake, as keys."""
     thigh = {"length_m": legs.thigh_length, "mass_kg": legs.thigh_mass, "mass_below_hip_m": legs.thigh_below}
     shank = {"length_m": legs.shank_length, "mass_kg": legs.shank_mass, "mass_below_knee_m": legs.shank_below}
     walker = {

@@ -18,7 +18,7 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 UNITS = np.eye(4)
-FALLEN = 1.2  # rad, of the stance leg
+FALLEN = 1.2  # rad; a walker whose stance leg leans further has fallen
 STRIKE_MISTAKES = {
     "−I × (trailing leg's rate − leading leg's rate)": {"extra": (1.0, -1.0)},
     "−I × the trailing leg's rate": {"extra": (1.0, 0.0)},
@@ -39,9 +39,10 @@ MISTAKES = {
     **STRIKE_MISTAKES,
     **SIZED_MISTAKES,
 }
-"""Planted mistakes, by words of the sentence that must name them; the hip's is a factor."""
+"""Planted mistakes. The keys are words of the sentence with which a check must name them. That of the hip is a factor.
+"""
 UNLISTED = {"leak": 0.02, "drag": 0.01, "spring": 0.05, "bounce": 0.97}
-"""Mistakes that no list has."""
+"""Mistakes that the check does not know."""
 
 
 @dataclass(frozen=True)
@@ -57,24 +58,25 @@ class Legs:
     gravity: float
     slope: float
     # mistakes
-    stance_sign: float = 1.0  # of the swing leg's centripetal term in the equation of the stance leg
-    swing_sign: float = 1.0  # of the stance leg's in that of the swing leg
-    velocity_sign: float = 1.0  # of all velocity terms
-    extra: tuple = (0.0, 0.0)  # weights of I times trailing and leading rate, subtracted about the hip
+    stance_sign: float = 1.0  # sign of the swing leg's centripetal term in the equation of the stance leg
+    swing_sign: float = 1.0  # sign of the stance leg's centripetal term in the equation of the swing leg
+    velocity_sign: float = 1.0  # sign of all velocity terms
+    # weights of I times the trailing and the leading rate, which the balance about the hip subtracts
+    extra: tuple = (0.0, 0.0)
     keeps_rate: bool = False
-    strike_radius: float | None = None  # of the foot in the strike only
+    strike_radius: float | None = None  # radius of the foot in the strike only
     strike_inertia: float | None = None
-    spin: float | None = None  # inertia in the extra term, if it is not the leg's
+    spin: float | None = None  # inertia in the extra term, if it differs from the leg's
     window: float = 0.0
     euler: float = 0.0
-    leak: float = 0.0  # a mistake that no list has: part of the hip's momentum lost in each strike
-    drag: float = 0.0  # another one: torque on the swing leg in proportion to its rate
+    leak: float = 0.0  # a mistake that the check does not know: fraction of the hip's momentum lost in each strike
+    drag: float = 0.0  # another such mistake: torque on the swing leg in proportion to its rate
     spring: float = 0.0  # between the legs
-    bounce: float = 1.0  # factor on the leading leg's rate after each strike
+    bounce: float = 1.0  # factor by which the leading leg's rate is multiplied after each strike
 
 
 def rates(legs, state):
-    """Derivative of (swing, stance, their rates), from Lagrange's function written out by hand."""
+    """Return the derivative of (swing angle, stance angle, their rates) from Lagrange's function, derived by hand."""
     a, b, da, db = state
     m, M, c, I, R, g = legs.mass, legs.hip, legs.below, legs.inertia, legs.radius, legs.gravity
     d = legs.length - R  # from the foot's centre to the hip
@@ -106,8 +108,10 @@ def cross(u, v):
 
 
 def strike(legs, before):
-    """State after a heel strike: both bodies' momenta change by impulses at the new contact point and at the hip."""
-    a, b, da, db = before  # swing leg, which lands, and stance leg, which trails
+    """Return the state after a heel strike. Impulses at the new contact point and at the hip change the momenta of both
+    bodies.
+    """
+    a, b, da, db = before  # a is the swing leg, which lands, and b the stance leg, which trails
     m, M, c = legs.mass, legs.hip, legs.below
     I = legs.inertia if legs.strike_inertia is None else legs.strike_inertia
     R = legs.radius if legs.strike_radius is None else legs.strike_radius
@@ -155,7 +159,9 @@ fallen.terminal = True
 
 
 def euler(legs, state, derivative, event, counts, limit):
-    """Time and state at which an event that counts falls to zero, by Euler's method and a straight line."""
+    """Return time and state when the event function falls to zero while `counts` is true, by Euler's method and a
+    straight line.
+    """
     before = event(state)
     for count in range(int(limit / legs.euler)):
         old, state = state, state + legs.euler * derivative(state)
@@ -170,7 +176,7 @@ def euler(legs, state, derivative, event, counts, limit):
 
 
 def step(legs, start):
-    """State just after the next heel strike, the period, and the state before the strike."""
+    """Return the state just after the next heel strike, the period, and the state just before the strike."""
 
     def touch(_t, state):
         return state[0] + state[1] - legs.window
@@ -240,7 +246,7 @@ def gait_with(legs, start, mistake, step=step):
 
 
 def random_legs(generator):
-    """Return a random walker with round feet and inertia, which has a gait more often than not."""
+    """Return a random walker with round feet and inertia. Most of them have a gait."""
     return Legs(
         length=1.0,
         mass=float(np.round(generator.uniform(0.3, 1.0), 2)),
@@ -254,7 +260,7 @@ def random_legs(generator):
 
 
 def config_of(legs):
-    """Config of the right walker, as keys."""
+    """Return the config of the walker without the mistake, as keys."""
     return {
         "walker": {
             "type": "straight-legs",
@@ -271,12 +277,12 @@ def config_of(legs):
 
 
 def printed(numbers, digits):
-    """Return numbers rounded to significant digits, as texts."""
+    """Return numbers as texts with this many significant digits."""
     return [f"{number:.{digits - 1 - math.floor(math.log10(abs(number)))}f}" for number in numbers]
 
 
 def right_gait(config):
-    """Return the state of the right gait that the package chooses, or None if the walker has none."""
+    """Return the state of the gait that the package chooses for the config, or None if there is no gait."""
     checked = checked_config(config, {})
     chosen = find_gaits(rigid_walker(checked), 0).gait
     if chosen is None:
@@ -298,7 +304,7 @@ def answer_to(config, state, period, digits):
 
 
 def walkers(seed, random=random_legs, config_of=config_of):
-    """Yield random walkers that have a gait, with its state."""
+    """Yield random walkers that have a gait, each with the state of the gait."""
     generator = np.random.default_rng(seed)
     while True:
         legs = random(generator)

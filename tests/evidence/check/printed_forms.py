@@ -19,7 +19,7 @@ OTHERS = {
 class Form:
     """Conventions of a printed state."""
 
-    changes: tuple  # names and values that differ from those that the config states
+    changes: tuple  # printed names and values that differ from the config
 
     def __getattr__(self, name):
         return dict(self.changes).get(name, BASE[name])
@@ -46,7 +46,7 @@ def printed_in(form, config, state, period, digits):
     length, gravity = config["walker"]["leg_length_m"], config["gravity_m_s2"]
     seconds = 1.0
     if "time" in dict(form.changes):
-        # the time that the config's gravity and the script's have in common
+        # unit of time in which the gravity of the config and that of the script are equal
         seconds = math.sqrt(length / gravity) if form.time == "sqrt(L/g)" else math.sqrt(form.time / gravity)
     factor = (math.degrees(1.0) if form.unit == "deg" else 1.0) * (-1.0 if form.positive == "clockwise" else 1.0)
     pairs = [(factor * angle, factor * rate * seconds) for angle, rate in pairs]

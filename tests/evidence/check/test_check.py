@@ -90,14 +90,16 @@ def test_plain_model_of_a_check_includes_knee_damping():
 
 
 def test_unexplained_state_of_a_kneed_walker_raises_no_error():
-    # the search for a gravity with which the state is periodic must not leave the positive ones
+    # The search for a gravity with which the state is periodic must try only positive values.
     state = ["0.1877", "-0.2884", "-1.1014", "-0.9399"]
     answer = walkerlab.check("kneed", {"state": state, "period_s": "0.5643"})
     assert answer.finding == "different, unexplained"
 
 
 def test_mistake_is_found_in_conventions_that_are_not_stated():
-    """The state is that of a script whose strike is wrong; its second angle is taken for an absolute one."""
+    """The script that computed the state has a wrong strike, and its relative second angle is taken for an absolute
+    one.
+    """
     config = load(PUBLISHED / "passivewalker-2009.yaml", ["check.angles.second=absolute"]).config
     (explanation,) = check_gait(config)["explanations"]
     assert explanation["kind"] == "mistake"
@@ -127,7 +129,7 @@ def test_published_state_is_explained_by_the_heel_strike_of_its_script():
     assert "−I × (trailing leg's rate − leading leg's rate)" in explanation["what"]
     whole, hip = answer["momenta"]
     assert (whole["conserved"], hip["conserved"]) == (True, False)
-    # the extra term is the inertia times the rate between the legs before the strike
+    # The extra term is the inertia times the relative rate of the legs before the strike.
     assert hip["residual"] == pytest.approx(3.15197e-4, rel=1e-4)
 
 
@@ -167,7 +169,7 @@ def test_multiplier_of_minus_one_is_explained_by_a_start_on_the_heel_strike():
 
 
 def printed_with(origin, second, unit, order, positive):
-    """Return the compass's gait in some conventions, computed from its state by hand."""
+    """Return the gait of the compass in some conventions, converted by hand."""
     swing, stance, dswing, dstance = walkerlab.find_gait().state
     tilt = 0.0174 if origin == "slope-normal" else 0.0
     angles = {"swing": (swing + tilt, dswing), "stance": (stance + tilt, dstance)}
@@ -230,7 +232,7 @@ def test_misprinted_parameter_is_found():
     state = find_gaits(rigid_walker(right), 0).gait.state
     answer = walkerlab.check("paper", {"state": [f"{value:.7f}" for value in state]})
     told = [each["what"] for each in answer.explanations]
-    # with point feet, a slope and a window of the touch are the same
+    # With point feet, a different slope has the same effect as a late touch.
     assert told[0] == "slope_rad is 0.0147 (two digits are transposed)"
     assert all("is accepted as soon as" in what for what in told[1:])
 

@@ -20,12 +20,12 @@ KNEED_SAMPLE = [(words, (6, 10)[place % 2]) for place, words in enumerate([*mist
 
 @pytest.fixture(scope="module")
 def walker():
-    """A random walker and its right gait."""
+    """Return a random walker and its gait without mistakes."""
     return next(walkers(7))
 
 
 def first_gait_with(mistake, found, step=mistaken_walks.step):
-    """The first walker that has a gait with a mistake, and that gait."""
+    """Return the first walker that has a gait with the mistake, and that gait."""
     gaits = ((legs, gait_with(legs, state, mistake, step)) for legs, state in found)
     return next((legs, each) for legs, each in gaits if each is not None)
 

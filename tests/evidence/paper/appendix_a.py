@@ -1,4 +1,4 @@
-"""Appendix A of the paper, typed from it as printed, and the same matrices from Lagrange's equations."""
+"""Appendix A of the paper, as printed, and the same matrices from Lagrange's equations."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ K = L * m + a * m + L * M_H
 
 
 def leg_masses_and_hip(foot):
-    """(A.1) to (A.3) with the stance foot at `foot`."""
+    """Return the positions of (A.1) to (A.3) with the stance foot at `foot`."""
     stance_mass = foot + sp.Matrix([-a * sp.sin(theta_2), a * sp.cos(theta_2)])
     hip = foot + sp.Matrix([-L * sp.sin(theta_2), L * sp.cos(theta_2)])
     swing_mass = hip + sp.Matrix([b * sp.sin(theta_1), -b * sp.cos(theta_1)])
@@ -32,7 +32,7 @@ def swing_foot(foot):
 
 @dataclass(frozen=True)
 class Equations:
-    """D ddq + bias + G = 0; `bias` is C dq, the part that every choice of C agrees on."""
+    """Terms of D ddq + bias + G = 0. Here `bias` is C dq, which is the same for every choice of C."""
 
     D: sp.Matrix
     bias: sp.Matrix
@@ -40,7 +40,7 @@ class Equations:
 
 
 def from_lagrange(coordinates, foot):
-    """Lagrange's equations (2) of the point masses, and of legs with inertia J."""
+    """Derive Lagrange's equations (2) for the point masses, with legs of inertia J."""
     rates = coordinates.diff(t)
     stance_mass, hip, swing_mass = leg_masses_and_hip(foot)
     masses = ((m, stance_mass), (M_H, hip), (m, swing_mass))
@@ -98,7 +98,7 @@ PRINTED_FOOT = sp.Matrix(
 
 
 def differing(one, other):
-    """Return the entries in which two matrices differ, with the difference."""
+    """Return the indices of entries in which two matrices differ, each with the difference."""
     difference = (one - other).applyfunc(lambda entry: sp.simplify(sp.expand_trig(entry)))
     indices = ((i, j) for i in range(one.rows) for j in range(one.cols))
     return {index: difference[index] for index in indices if difference[index] != 0}

@@ -1,4 +1,4 @@
-"""Appendix A written once more, in NumPy and SciPy, to check the errata."""
+"""Appendix A in NumPy and SciPy, written independently of the package to check the errata."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -7,7 +7,7 @@ L, A, B, LEG, HIP, G = 1.0, 0.5, 0.5, 5.0, 10.0, 9.81
 
 
 def positions(q, foot=(0.0, 0.0)):
-    """Stance leg's mass, hip, swing leg's mass, swing foot: (A.1) to (A.3)."""
+    """Return the positions of stance leg mass, hip, swing leg mass and swing foot, (A.1) to (A.3)."""
     theta_1, theta_2 = q
     up = np.array([-np.sin(theta_2), np.cos(theta_2)])
     down = np.array([np.sin(theta_1), -np.cos(theta_1)])
@@ -16,7 +16,7 @@ def positions(q, foot=(0.0, 0.0)):
 
 
 def swing_rates(sign):
-    """Right-hand side of (A.58) with `sign` of C_21."""
+    """Return the right-hand side of (A.58) in which C_21 has the given sign."""
 
     def rates(_t, x):
         theta_1, theta_2, omega_1, omega_2 = x
@@ -30,7 +30,7 @@ def swing_rates(sign):
 
 
 def swing(start, sign, slope, longest=2.0):
-    """A swing up to its heel strike, with dense output."""
+    """Integrate a swing up to its heel strike, with dense output."""
 
     def feet(_t, x):
         return x[0] + x[1] + 2.0 * slope if x[0] > x[1] else 1.0
@@ -49,26 +49,26 @@ def swing(start, sign, slope, longest=2.0):
 
 
 def fall(start, sign, longest):
-    """Integrate the same motion without watching the feet."""
+    """Integrate the same motion, but ignore heel strikes."""
     return solve_ivp(
         swing_rates(sign), (0.0, longest), start, method="DOP853", rtol=1e-11, atol=1e-13, dense_output=True
     )
 
 
 def velocities(x, step=1e-6):
-    """Velocities of the three masses, by central differences of their positions."""
+    """Return the velocities of the three masses by central differences of their positions."""
     q, rate = np.asarray(x[:2]), np.asarray(x[2:])
     ahead, behind = positions(q + step * rate), positions(q - step * rate)
     return [(one - other) / (2.0 * step) for one, other in zip(ahead[:3], behind[:3], strict=True)]
 
 
 def energy(x):
-    """Kinetic and potential energy from the stance foot."""
+    """Return the kinetic energy plus the potential energy above the stance foot."""
     masses = (LEG, HIP, LEG)
     kinetic = sum(0.5 * m * v @ v for m, v in zip(masses, velocities(x), strict=True))
     return kinetic + sum(m * G * p[1] for m, p in zip(masses, positions(x[:2]), strict=False))
 
 
 def momentum(x):
-    """Linear momentum of the walker."""
+    """Return the linear momentum of the walker."""
     return sum(m * v for m, v in zip((LEG, HIP, LEG), velocities(x), strict=True))

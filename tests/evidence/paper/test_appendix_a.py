@@ -1,4 +1,4 @@
-"""Compare the printed equations with Lagrange's, derived here, and both with the compiled physics."""
+"""Compare the printed equations with Lagrange's equations, derived here, and both with the compiled physics."""
 
 import math
 
@@ -88,7 +88,7 @@ states = st.tuples(angles, angles, rates, rates)
 
 @pytest.fixture(scope="module")
 def numeric(swing):
-    """Derived D, bias, G, energies and ground reaction as functions of parameters, angles and rates."""
+    """Return D, bias, G, energies and ground reaction, as derived, as functions of parameters, angles and rates."""
     names = sp.symbols("t1 t2 u1 u2 a1 a2")
     stance_mass, hip, swing_mass = paper.leg_masses_and_hip(sp.zeros(2, 1))
     bodies = ((paper.m, stance_mass), (paper.M_H, hip), (paper.m, swing_mass))
@@ -119,7 +119,9 @@ def arguments(walker, state, accelerated=(0.0, 0.0)):
 
 
 def close(value, expected, scale):
-    """Whether two values agree up to rounding of terms of size `scale`, which cancellation in D^-1 can magnify."""
+    """Whether two values agree up to the rounding of terms of size `scale`. Cancellation in D^-1 can magnify this
+    rounding.
+    """
     return abs(value - expected) <= 1e-11 * scale
 
 
@@ -150,7 +152,7 @@ def test_ground_reaction_is_the_momentum_rate_plus_the_weight(numeric, walker, s
     sine, cosine = math.sin(walker.slope), math.cos(walker.slope)
     mass = walker.hip_mass + 2 * walker.leg_mass
     scale = mass * (walker.gravity + walker.leg_length * (9.0 + max(map(abs, alpha))))
-    # down the slope is (cos phi, -sin phi)
+    # The direction down the slope is (cos phi, -sin phi).
     assert close(along, force_x * cosine - force_y * sine, scale)
     assert close(normal, force_x * sine + force_y * cosine, scale)
 

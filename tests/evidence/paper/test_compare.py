@@ -1,4 +1,4 @@
-"""Tests of the comparison of both models, with results in the layout of the other stages."""
+"""Tests of the comparison of both models, on synthetic results in the layout of other stages."""
 
 import json
 
@@ -40,7 +40,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def gaits(study):
-    """A result of fixedpoint with the parts that other stages read."""
+    """Return a result of `fixedpoint` with only the parts that other stages read."""
 
     def entry(name, model):
         return {
@@ -56,7 +56,7 @@ def gaits(study):
 
 
 def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
-    """The rigid walk, a little slower and without samples at its heel strikes, laid out as a contact walk."""
+    """Return the rigid walk in the layout of a contact walk, slightly slower and without samples at heel strikes."""
     done, trajectory = rigid["steps"], rigid["trajectory"]
     touches = SLOWER * done["touch_time_s"][:steps]
     end = touches[-1] if steps else 0.3
@@ -91,7 +91,7 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
 
 @pytest.fixture(scope="module")
 def compared(gaits):
-    """Compare with a contact walk of some steps, leaving out parts of its record."""
+    """Return the comparison with a contact walk that has this many steps and lacks some of its records."""
 
     def result(*sets, steps=10, leave_out=(), outcome="walked", samples=None, fixedpoint=gaits):
         config = load(None, sets).config
@@ -255,7 +255,7 @@ def test_stored_columns_list_only_rows_with_a_value(compared):
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
-    """The whole pipeline up to compare, on the paper's config."""
+    """Return the results of the pipeline up to `compare` for the paper's config."""
     loaded = load(None)
     folder = RunFolder(tmp_path_factory.mktemp("runs"), loaded.run_name)
     return execute(loaded.config, "compare", folder)

@@ -1,4 +1,4 @@
-"""Measure the errata of the paper again, by other methods."""
+"""Check the errata of the paper by independent methods."""
 
 from fractions import Fraction
 
@@ -190,7 +190,9 @@ def test_errata_quote_the_measured_values(found):
 
 
 def test_contact_parameters_can_be_read_in_three_ways(found):
-    """In a model in metres 10^8 N/m^2.2 carry 20 kg 2.5 mm deep; 1000^1.2 times more carry them 0.06 mm deep."""
+    """In a model in metres, ground of 10^8 N/m^2.2 carries 20 kg at a depth of 2.5 mm. Ground that is 1000^1.2 times
+    stiffer carries them at 0.06 mm.
+    """
     measured = found["section 4, Fig. 4b"].measured
     weight = 20 * 9.81
     depths = [

@@ -24,12 +24,12 @@ PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 
 
 def at_heel_strike(walker, half_angle):
-    """Angles with both feet on the slope, the swing leg ahead."""
+    """Return the angles with both feet on the slope and the swing leg ahead."""
     return half_angle - walker.slope, -half_angle - walker.slope
 
 
 def printed_system(walker, theta_1, theta_2, w_1, w_2, foot_row_2):
-    """(A.57) with D_e from (A.9) to (A.24) and E from (A.56); unknowns (dq_e+, F)."""
+    """Solve (A.57) for (dq_e+, F), with D_e from (A.9) to (A.24) and E from (A.56)."""
     L, a, m, M_H = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
     D_e = released_mass_matrix(L, a, m, M_H, theta_1, theta_2)
     E = np.array([[L * math.cos(theta_1), -L * math.cos(theta_2), 1.0, 0.0], foot_row_2])
@@ -45,7 +45,7 @@ def test_impact_solves_the_system_of_the_paper_at_the_actual_foot_position(walke
     height_row = [L * math.sin(theta_1), -L * math.sin(theta_2), 0.0, 1.0]
     solved = printed_system(walker, theta_1, theta_2, w_1, w_2, height_row)
     after = impact(walker, theta_1, theta_2, w_1, w_2)
-    # roles change: the leg that was swinging is the stance leg now
+    # The legs change roles: the leg that was swinging is now the stance leg.
     assert after[:2] == (theta_2, theta_1)
     assert (after[3], after[2]) == pytest.approx(solved[:2], rel=1e-9, abs=1e-9)
 
@@ -115,7 +115,7 @@ def test_impact_never_gains_energy(walker, half_angle, w_1, w_2):
 
 @given(walkers, rates)
 def test_impact_of_a_foot_at_rest_changes_nothing(walker, rate):
-    # with the legs together and turning alike, the swing foot is where the stance foot is
+    # The legs are together and turn at the same rate, so both feet are at rest at the same point.
     together = (-walker.slope, -walker.slope, rate, rate)
     after = impact(walker, *together)
     assert after == pytest.approx(together, rel=1e-9, abs=1e-9)

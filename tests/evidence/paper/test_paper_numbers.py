@@ -66,7 +66,7 @@ def test_printed_number_has_a_value_and_a_last_digit(text, value, last_digit):
     assert printed(text).digits.unit == pytest.approx(last_digit)
 
 
-def test_verbal_comparisons_are_read_as_numbers():
+def test_comparisons_in_words_are_read_as_numbers():
     assert printed("less than 1%").value == printed("less than one").value == 1
 
 
@@ -190,7 +190,8 @@ OWN_CONTRADICTIONS = (
 def test_each_printed_value_is_counted_once(rows, study):
     every = list(paper_rows(rows.measured(), study))
     assert len({(row.number.where, row.number.quantity) for row in every}) == len(every) == 38
-    # eq. 11 and the MATLAB column of Table 2 print the same four values, Table 2 and section 4 the same two percentages
+    # Eq. 11 and the MATLAB column of Table 2 print the same four values. Table 2 and section 4 print the same two
+    # percentages.
     printed_twice = [row for row in every if re.match("(eq.|Table).*,", row.number.where)]
     assert len(printed_twice) == 4 + 2
 
@@ -223,7 +224,7 @@ def test_evidence_consists_of_capitalised_sentences(rows):
 
 
 def test_rounding_is_allowed_for_before_a_value_counts_as_contradicted(rows):
-    row = rows()[TABLE_2[0].percent]  # -0.2022 and -0.2021 may differ by up to 0.1%
+    row = rows()[TABLE_2[0].percent]  # Unrounded, -0.2022 and -0.2021 may differ by up to 0.1 %.
     assert (row.verdict, "a change of -0.10 to +0.00%, given the rounding" in row.evidence) == (
         Verdict.EXPLAINED,
         True,
@@ -254,12 +255,12 @@ def test_matlab_energy_is_explained_and_adams_energy_is_not_reproduced(rows):
     assert found[E_AVG.matlab].verdict == Verdict.EXPLAINED
     for said in ("150.110 J over five steps", "150.127 J over ten", "its value matches the mean over ten"):
         assert said in found[E_AVG.matlab].evidence
-    # 150.03 J, with samples to either side of the printed number, and it between the means of all models
+    # The mean is 150.03 J. Samples lie on either side of the printed value, which lies between the means of all models.
     assert found[E_AVG.adams].verdict == Verdict.NOT_REPRODUCED
     assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
-def test_fall_is_not_explained_by_a_start_that_walks(rows):
+def test_start_that_walks_does_not_explain_a_fall(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.values["contact"]) == (Verdict.NOT_REPRODUCED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence

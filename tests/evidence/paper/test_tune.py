@@ -1,4 +1,6 @@
-"""Tests of the adjustment: not needed on the paper's contact, found where it exists, and reported where it does not."""
+"""Tests of the adjustment, which is not needed on the paper's ground, is found if there is one, and otherwise reported
+as missing.
+"""
 
 import functools
 from dataclasses import replace
@@ -23,7 +25,7 @@ from walkerlab.views.report.words import words
 
 @functools.cache
 def tuned(config, *sets):
-    """The stage's result with a small map."""
+    """Return the result of the stage, with a small map."""
     loaded = load(Path(config), sets).config
     gait = fixedpoint.run(restrict(loaded, PIPELINE["fixedpoint"].takes), {}, Silent())
     return tune.run(restrict(loaded, PIPELINE["tune"].takes), {"fixedpoint": gait}, Silent())
@@ -80,7 +82,7 @@ def test_both_outcomes_of_the_adams_start_name_model_and_ground():
     assert contact.startswith("its checkerboard of pads, the ground, which cannot pull, carries no more than")
     assert f"and the walk ends at {start['end_time_s']:.3g} s" in contact
     assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact
-    # pads are what ends it: without them it flies on
+    # The pads end the walk. Without them the walker flies on.
     plane = small("paper", "contact.terrain=after-mid-swing", "strides=1", cells=2)
     assert plane.summary["paper_start"]["outcome"] != "off-pad"
 
@@ -140,7 +142,7 @@ def test_page_says_that_no_start_leads_to_walking():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_laid_for_a_missing_gait_give_no_answer():
+def test_pads_at_the_step_length_of_a_missing_gait_give_no_answer():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 

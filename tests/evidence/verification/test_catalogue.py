@@ -1,4 +1,4 @@
-"""Tests of the catalogue: its range, its validity, and the ends of some cases of each family."""
+"""Tests of the catalogue of cases: its range, its validity, and how some cases of each family end."""
 
 import pytest
 

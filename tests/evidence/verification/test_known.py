@@ -1,4 +1,4 @@
-"""Tests of the contact code on problems with known answers, and of the references by one more method."""
+"""Tests of the contact code on problems with known answers. The answers are checked by one more method."""
 
 import math
 

@@ -24,7 +24,7 @@ CELLS = 2
 
 
 class CutOff(Silent):
-    """A progress that interrupts the run after some calls of `advance`."""
+    """A progress display that interrupts the run after some calls of `advance`."""
 
     def __init__(self, left):
         self.left, self.done, self.total = left, 0, 0
@@ -65,7 +65,7 @@ def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():
     numbers = step_column(PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3))
     verdicts = [VERDICT_NAMES[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
-    assert 0.0 < numbers[1] < 0.7 * numbers[3]  # halving the step of a method of first order or better
+    assert 0.0 < numbers[1] < 0.7 * numbers[3]  # A method of first order or better at half the step.
     assert numbers[5] == ERROR_MISSING
 
 
@@ -100,7 +100,7 @@ def test_both_maps_are_stored(whole):
     stiction, step = whole.groups["stiction"], whole.groups["step"]
     assert stiction["outcome"].shape == step["verdict"].shape == (CELLS, CELLS)
     np.testing.assert_array_equal(step["step_size"], np.geomspace(1e-6, 1e-2, CELLS))
-    assert stiction["outcome"][1, 0] == Outcome.SLID  # oil
+    assert stiction["outcome"][1, 0] == Outcome.SLID  # Friction as on oil.
     assert step["verdict"][1].tolist() == [VERDICT_NAMES.index("diverges")] * 2
     assert whole.summary["cells"] == 8
     assert sum(whole.summary["outcomes"].values()) == sum(whole.summary["fixed_step"].values()) == 4
@@ -113,7 +113,7 @@ def test_walker_slides_on_oil_at_any_stiffness(stiffer):
 
 def test_interrupted_run_resumes_with_the_same_result(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        run(tmp_path, CutOff(left=1 + 3))  # what was there, and three pieces
+        run(tmp_path, CutOff(left=1 + 3))  # the piece that existed already, and three new ones
     kept = Checkpoint(tmp_path / "maps.parts", "key").kept
     assert sorted(kept) == ["step 0", "step 1", "stiction 0 0"]
     rest = CutOff(left=99)

@@ -1,4 +1,4 @@
-"""Check that the measures notice errors."""
+"""Check that the measures detect errors."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,7 @@ from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
 from walkerlab.evidence.paper.appendix_a import impact
 from walkerlab.evidence.paper.walker import compass
-from walkerlab.evidence.verification.catalogue import config_of, package_cases, scaled, to_twin
+from walkerlab.evidence.verification.catalogue import config_of, package_cases, scale_config, to_twin
 from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.starts import (
     RigidMasses,
@@ -22,6 +22,7 @@ from walkerlab.evidence.verification.starts import (
 )
 from walkerlab.evidence.verification.verdict import Measure, finite
 from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.mechanics.hinges import HINGE_LAWS, HingeTorque, SpringDamper, hinge_energy, hinge_torque
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
 from walkerlab.physics.orbits.similarity import Units, unit_walker
@@ -88,11 +89,46 @@ def test_measure_that_is_nan_or_infinite_fails():
 def test_scaling_a_walker_to_another_size_and_back_restores_it():
     by = to_twin(PAPER)
     back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
-    again = scaled(scaled(PAPER, by), back)
+    again = scale_config(scale_config(PAPER, by), back)
     assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
     one, other = again.contact.to_si(), PAPER.contact.to_si()
     assert vars(one) == pytest.approx(vars(other))
+
+
+class QuadraticDamper(SpringDamper):
+    """A hinge law whose damping has a unit of its own: N m s^2/rad^2."""
+
+    @classmethod
+    def units(cls, energy, time):
+        return cls(energy, energy * time**2, energy)
+
+
+@hinge_torque.case(QuadraticDamper)
+def quadratic_torque(law, angle, rate):
+    elastic, damping = law.stiffness * angle, law.damping * abs(rate)
+    return HingeTorque(elastic + damping * rate - law.torque, elastic, law.stiffness, 2.0 * damping)
+
+
+@hinge_energy.case(QuadraticDamper)
+def quadratic_energy(law, angle):
+    return 0.5 * law.stiffness * angle * angle
+
+
+def test_twin_of_a_walker_scales_hinge_parameters_by_the_units_of_their_law(monkeypatch):
+    monkeypatch.setitem(HINGE_LAWS.laws, "quadratic", QuadraticDamper)
+    legs = "walker.leg_2={knee: {damping_N_m_s_per_rad: 0.03}}"
+    config = load(Path("kneed"), ["walker.hip.spring_N_m_per_rad=0.2", "walker.knee.damping_N_m_s_per_rad=0.02", legs])
+    walker = config.config.walker
+    law = {"hip": walker.hip.model_copy(update={"hinge_law": "quadratic"})}
+    config = config.config.model_copy(update={"walker": walker.model_copy(update=law)})
+    by = to_twin(config)
+    twin = scaled(config, by)
+    assert twin.walker.knee.stop_damping == pytest.approx(walker.knee.stop_damping * by.energy * by.time)
+    own, twins = (unit_walker(rigid_walker(each))[0] for each in (config, twin))
+    assert np.count_nonzero(own["laws"]) == 2
+    np.testing.assert_allclose(twins["laws"], own["laws"], rtol=1e-12)
+    np.testing.assert_allclose(twins.exchanged["laws"], own.exchanged["laws"], rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
@@ -100,7 +136,9 @@ def test_driven_walkers_of_two_sizes_are_equal_at_unit_size(name):
     hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "hinge_law")
     sets = (*hip, "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config
-    own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))
+    own, twins = (
+        unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scale_config(config, to_twin(config)))
+    )
     for field in own.dtype.names:
         np.testing.assert_allclose(twins[field], own[field], rtol=1e-12, atol=1e-15, err_msg=field)
 

@@ -1,4 +1,4 @@
-"""Tests of ordinary methods: which failures they report, and which they do not."""
+"""Tests of the comparison with ordinary methods: which failures count, and which do not."""
 
 import numpy as np
 import pytest

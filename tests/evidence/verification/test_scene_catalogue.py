@@ -1,4 +1,4 @@
-"""Tests of the extreme cases of a scene: their range for each walker, and the measures for every kind of walker."""
+"""Tests of the extreme cases of a scene: which cases each walker has, and how cases of every walker are measured."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import dotted_keys
 from walkerlab.config.schema import Config
-from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scaled, scene_cases, to_twin
+from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_ENDS, scale_config, scene_cases, to_twin
 from walkerlab.evidence.verification.judge import CaseCell
 from walkerlab.evidence.verification.stability import resolve_scene
 from walkerlab.evidence.verification.starts import RigidMasses, energy_gain, feet_off_the_slope
@@ -39,7 +39,7 @@ def cases_of(config, gait=GAIT):
 
 
 def start_of(config):
-    """Return a moving start: legs apart on the slope, knees straight and the torso on the bisector."""
+    """Return a start in motion, with both feet on the slope, straight knees and the torso on the bisector."""
     model = rigid_walker(config, "corrected")
     bodies = len(model.zero_state) // 2
     stance = 0.2
@@ -129,14 +129,14 @@ def test_summed_kinetic_energy_equals_that_of_the_equations(name):
 def test_scaling_a_walker_up_and_down_again_restores_it(name, sets):
     config = config_of(name, *sets)
     by = to_twin(config)
-    twin = scaled(config, by)
+    twin = scale_config(config, by)
     assert twin.walker.total_mass_kg == pytest.approx(by.mass * config.walker.total_mass_kg)
-    again = scaled(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
+    again = scale_config(twin, Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time))
     assert numbers_of(again.walker.model_dump()) == pytest.approx(numbers_of(config.walker.model_dump()))
 
 
 def numbers_of(block):
-    """Every number of a block and the blocks in it."""
+    """Yield every number of a block and of the blocks in it."""
     inner = [numbers_of(value) if isinstance(value, dict) else value for value in block.values()]
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 

@@ -1,4 +1,6 @@
-"""Tests of the second method for a case: the choice, the allowed difference, and the message if there is none."""
+"""Tests of the second method for a case: which one is chosen, what difference is allowed, and the message if there is
+none.
+"""
 
 from types import SimpleNamespace
 
@@ -14,7 +16,9 @@ CASES = {case.name: case for case in package_cases()}
 
 
 def ending(*outcomes):
-    """Return a walk that ends with each outcome in turn, and the list of methods and budgets requested."""
+    """Return a function that walks and ends with each outcome in turn, and the list of methods and budgets requested of
+    it.
+    """
     asked, left = [], list(outcomes)
 
     def walk(method, budget):

@@ -26,7 +26,7 @@ BAD = replace(GOOD, name="bad", outcome="fell")
 
 
 def known(name, value):
-    """A known problem as its stage prints it."""
+    """Return a problem with a known answer as the stage prints it."""
     answer = Known(name, "time, s", value, 1.0, "closed form", 1e-6, "tolerance", 0.1)
     return {**asdict(answer), "error": answer.error, "ok": answer.ok}
 
@@ -50,7 +50,7 @@ def report_of(summary, **others):
     return section(Results(None, stored))
 
 
-def test_passing_every_case_is_a_result():
+def test_stage_gives_a_result_if_every_case_passes():
     summary = summarise([GOOD], [RIGHT], [])
     assert "no_answer" not in summary
     assert (summary["passed"], summary["failed"]) == (2, 0)
@@ -197,7 +197,7 @@ def test_scene_with_mode_changes_is_not_tried_with_ordinary_methods(lines):
     assert shown == []
 
 
-def test_verdict_names_what_failed():
+def test_verdict_names_the_failed_checks():
     summary = summarise([BAD], [], [])
     results = Results(load().config, {"stability": SimpleNamespace(summary=summary, groups={})})
     first = verdict_section.section(results).blocks[0]

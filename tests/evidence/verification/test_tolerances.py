@@ -15,7 +15,9 @@ def case():
 
 
 def test_lightest_walker_takes_the_same_steps_at_every_tolerance(case):
-    """Its feet are damped hardest for their mass: a velocity got as a difference ends such walks by chance."""
+    """For its mass, it has the strongest damping of the feet. If a velocity is computed as a difference, such walks end
+    by chance.
+    """
     start = prepare_start(config_of(case), case)
     walks = [
         start.walk(case, case_tolerances(start, case, tighter)) for tighter in (2.0, 1.0, 0.7, 0.3, 0.15, 0.05, 0.01)

@@ -72,7 +72,7 @@ def test_roughness_and_kicks_are_separated():
     for floor, kick in ((0.1, 0.0), (0.0, 0.05), (0.1, 0.05)):
         spread = np.repeat([floor, kick], 40)
         data = Linearised(noise + G @ (spread * disturbances), J, G, quantity, np.zeros((0, 3)), np.ones(1), 0.0, 40)
-        found = estimate_noise(reduce(data), np.full(1, 1e-6), 1.0, Noise(np.ones(1), 0.0))
+        found, _ = estimate_noise(reduce(data), np.full(1, 1e-6), 1.0, Noise(np.ones(1), 0.0))
         assert found.process == pytest.approx([floor, kick], abs=0.02)
 
 
@@ -104,7 +104,7 @@ def test_noise_of_many_values_is_recovered():
     noise = np.array([0.3, 0.6])[quantity] * draw.normal(size=8000)
     residuals = J @ [1.0, -2.0] + 0.1 * G @ draw.normal(size=60) + noise
     products = reduce(Linearised(residuals, J, G, quantity, np.zeros((0, 3)), np.ones(2)))
-    found = estimate_noise(products, np.full(2, 1e-6), 1.0, Noise(np.ones(2), 0.0))
+    found, _ = estimate_noise(products, np.full(2, 1e-6), 1.0, Noise(np.ones(2), 0.0))
     assert found.measurement == pytest.approx([0.3, 0.6], rel=0.04)
     assert found.roughness_m == pytest.approx(0.1, rel=0.3)
 
@@ -115,7 +115,7 @@ def test_even_floor_is_estimated_as_even():
     products = reduce(
         Linearised(draw.normal(size=400), np.ones((400, 1)), G, np.zeros(400, int), np.zeros((0, 2)), np.ones(1))
     )
-    found = estimate_noise(products, np.array([1e-6]), 1.0, Noise(np.ones(1), 0.0))
+    found, _ = estimate_noise(products, np.array([1e-6]), 1.0, Noise(np.ones(1), 0.0))
     assert found.roughness_m < 0.03
 
 

@@ -1,4 +1,4 @@
-"""Walkers on compliant ground, and states of them placed by hand, for tests of their physics."""
+"""Walkers on compliant ground and states built by hand, for tests of the physics."""
 
 import math
 
@@ -27,7 +27,7 @@ def compass(friction=COULOMB, normal=ADAMS, radius=0.001, inertia=0.0, slope=SLO
 
 
 def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):
-    """One body on two runners: a loaded block."""
+    """Return one body on two runners, which acts like a loaded block."""
     body = Body("sledge", 20.0, (0.0, 0.1), 2.0)
     feet = tuple(BallFoot(name, "sledge", (x, radius), radius) for name, x in (("rear", -0.4), ("front", 0.4)))
     return contact_walker(Assembly((body,), (), feet=feet), normal, friction, GRAVITY, slope)
@@ -46,11 +46,13 @@ def placed(walker, foot, depth, theta, omega, slip, vertical_velocity, along=0.0
 
 
 def masses_of_the_compass(state, slope=SLOPE):
-    """(mass, position, velocity) of legs and hip in the slope's frame, from the centre of mass and the two angles."""
+    """Return (mass, position, velocity) of legs and hip in the slope's frame, computed from the centre of mass and the
+    two angles.
+    """
     x, y, theta_1, theta_2, v_x, v_y, w_1, w_2 = state
     up = [np.array([-math.sin(t + slope), math.cos(t + slope)]) for t in (theta_1, theta_2)]
     turn = [w * np.array([-math.cos(t + slope), -math.sin(t + slope)]) for t, w in ((theta_1, w_1), (theta_2, w_2))]
-    # legs of 5 kg half a metre below the hip of 10 kg: the centre of mass lies 1/8 m below the hip along either leg
+    # With legs of 5 kg half a metre below a hip of 10 kg, the centre of mass is 1/8 m along each leg from the hip.
     hip = np.array([x, y]) + 0.125 * (up[0] + up[1])
     v_hip = np.array([v_x, v_y]) + 0.125 * (turn[0] + turn[1])
     legs = [(5.0, hip - 0.5 * u, v_hip - 0.5 * t) for u, t in zip(up, turn, strict=True)]

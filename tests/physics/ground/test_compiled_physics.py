@@ -1,4 +1,4 @@
-"""Check that machine code and the Python code from which it is compiled give the same motion."""
+"""Check that machine code gives the same motion as the Python code from which it is compiled."""
 
 import ground_walkers as ground
 import numpy as np
@@ -29,7 +29,8 @@ def check(system, state):
     right_hand_side(system, 0.0, y, rate)
     jacobian_matrix(system, 0.0, y, J)
     expected, K = np.array(rate_of(system, state)), gradient_of(system, state)
-    # fused multiply-adds round once where Python rounds twice, and stiffness magnifies the rounding of the height
+    # A fused multiply-add rounds once where Python rounds twice, and the stiffness magnifies the rounding of the
+    # height.
     assert np.abs(rate - expected).max() <= 1e-10 * (1.0 + np.abs(expected).max())
     assert np.abs(J - K).max() <= 1e-10 * (1.0 + np.abs(K).max())
 

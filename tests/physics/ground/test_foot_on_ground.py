@@ -30,7 +30,7 @@ def motion_of(walker, foot, state):
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
 def test_slip_is_the_velocity_of_the_foot_material_at_the_contact(theta, omega, slip, vertical_velocity, depth, foot):
-    """Follow the material point that is lowest now for a moment: the ball turns with its leg."""
+    """Follow the point that is now lowest for a moment, while the ball turns with its leg."""
     walker = ground.compass(radius=BALL)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
     _, _, (_, hip, v_hip) = ground.masses_of_the_compass(state)
@@ -62,7 +62,7 @@ def test_energies_are_sums_over_legs_and_hip(theta, omega, slip, vertical_veloci
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
 def test_momentum_changes_by_the_contact_force(theta, omega, slip, vertical_velocity, depth, foot):
-    """Newton and Euler of legs and hip about the contact point, for the whole walker: forces of gravity and ground."""
+    """For the whole walker, gravity and ground change the momentum and the angular momentum about the contact point."""
     walker = ground.compass(radius=BALL)
     has_ground = (foot == 0, foot == 1)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
@@ -90,7 +90,7 @@ def test_momentum_changes_by_the_contact_force(theta, omega, slip, vertical_velo
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
 @example(theta=(0.6875, 0.0), omega=(0.0, 2.0**-7), slip=0.0, vertical_velocity=0.0, depth=2.0**-7, foot=0)
 def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, vertical_velocity, depth, foot):
-    """dE/dt of the energy balance along the motion is what damping and friction take."""
+    """Along the motion, the energy falls at the rate at which damping and friction take it."""
     walker = ground.compass(normal=SOFT)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
     rate = np.array(rate_of(place_on_ground(walker, BOTH), state))
@@ -98,8 +98,10 @@ def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, verti
     damping, friction = np.sum(powers, axis=0)
     assert damping >= 0.0
     assert friction >= 0.0
-    assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-4)  # the other foot reaches no join of the law
-    h = 1e-5 / (1.0 + np.abs(rate).max() * 1e-2)  # long enough for the rounding of energies of 1 kJ to be left small
+    # the other foot must not reach a switching point of the law
+    assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-4)
+    # The step is long enough that the rounding of energies of 1 kJ remains small.
+    h = 1e-5 / (1.0 + np.abs(rate).max() * 1e-2)
     before, after = (total_energy(place_on_ground(walker, BOTH), tuple(state + step * rate)) for step in (-h, h))
     size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker.whole, tuple(state))
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
@@ -162,12 +164,12 @@ def test_derivatives_on_ground_equal_finite_differences(friction, theta, omega, 
     state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     has_ground = (foot == 0, foot == 1)
     motion = motion_of(walker, foot, state)
-    assume(foot_force(walker, motion).normal.force > 1e-2)  # not clipped, nor about to be
+    assume(foot_force(walker, motion).normal.force > 1e-2)  # the force must not be near the clip at zero
     J = gradient_of(place_on_ground(walker, has_ground), state)
     position = 1e-3 * depth
     steps = (1e-6, position, position, position, 1e-5, 1e-5, 1e-5, 1e-5)
     expected = differenced(place_on_ground(walker, has_ground), state, steps)
-    # every column by its own size: stiffness along the height is a million times friction's along the speed
+    # Compare each column relative to its own size: the stiffness for the height is a million times that of friction.
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-4
 
@@ -179,7 +181,7 @@ def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity
     J = gradient_of(place_on_ground(walker, (False, True)), state)
     steps = (1e-6, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6)
     expected = differenced(place_on_ground(walker, (False, True)), state, steps)
-    assert np.abs(J[:, 1]).max() > 1e6  # stiff indeed: so an absolute tolerance would say nothing
+    assert np.abs(J[:, 1]).max() > 1e6  # The matrix is so stiff that an absolute tolerance would say nothing.
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-5
 
@@ -205,7 +207,9 @@ def creep_velocity(slope, friction):
 
 @pytest.mark.parametrize("slope", [0.02, 0.1])
 def test_loaded_block_creeps_downhill_instead_of_sticking(slope):
-    """T/N = tan(slope); the cubic gives mu = mu_s (3 u - u^3) / 2 at u = v / v_s, near v_s (T/N) / (1.5 mu_s)."""
+    """The slope needs T/N = tan(slope), and the cubic gives mu = mu_s (3 u - u^3) / 2 at u = v / v_s. So v is near v_s
+    (T/N) / (1.5 mu_s).
+    """
     law = ground.COULOMB
     velocity = creep_velocity(slope, law)
     u = velocity / law.stiction_velocity
@@ -216,5 +220,6 @@ def test_loaded_block_creeps_downhill_instead_of_sticking(slope):
 def test_block_on_a_slope_steeper_than_its_friction_slides_away():
     law = Coulomb(0.2, 0.1, 0.01, 0.1)
     velocity = creep_velocity(0.3, law)
-    expected = ground.GRAVITY * (np.sin(0.3) - 0.1 * np.cos(0.3))  # after 1 s, less the moment in which mu_s held it
+    # speed after 1 s, less what it lost while mu_s held the block
+    expected = ground.GRAVITY * (np.sin(0.3) - 0.1 * np.cos(0.3))
     assert 0.9 * expected < velocity <= expected * 1.001

@@ -1,4 +1,4 @@
-"""Check that a locked knee makes the same motion in both forms: as one body, and as two that are held together."""
+"""Check that a locked leg moves in the same way in both forms: as one body, and as two bodies held together."""
 
 import numpy as np
 import pytest
@@ -51,14 +51,14 @@ def state_in_line(walker, knee):
 def test_merged_body_accelerates_like_two_locked_bodies(assembly, knee):
     walker = walker_of(assembly)
     y = state_in_line(walker, knee)
-    # a walker with stops keeps its bodies, and the shank follows
+    # A walker with stops keeps all bodies, and the shank follows the thigh.
     expected = rate_of(place_on_ground(walker_of(assembly, stop=LAW), BOTH, knee), y)
     one = place_on_ground(walker, BOTH, knee)
     z = to_form(one.form, y)
     assert z.size == y.size - 2 * sum(doing == LOCKED for doing in knee)
     whole = to_full(one.form, rate_of(one, z), y.size)
     np.testing.assert_allclose(whole, expected, rtol=1e-10, atol=1e-9)
-    assert np.abs(expected).max() > 10.0  # the ground pushes
+    assert np.abs(expected).max() > 10.0  # makes sure that the ground pushes
     assert total_energy(one, z) == pytest.approx(total_energy(place_on_ground(walker, BOTH), y), rel=1e-12)
     np.testing.assert_array_equal(floating_state(one.form, z, y.size), y)
 

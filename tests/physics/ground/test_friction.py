@@ -1,4 +1,4 @@
-"""Tests of friction that creeps, ADAMS's Coulomb law."""
+"""Tests of ADAMS's Coulomb law, a friction law that creeps."""
 
 import numpy as np
 import pytest

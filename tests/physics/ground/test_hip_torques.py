@@ -1,4 +1,4 @@
-"""Check that torques between the legs are those of the rigid model, whichever leg swings."""
+"""Check that torques between the legs equal those of the rigid model, whichever leg swings."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ rates = st.tuples(*(st.floats(-3.0, 3.0),) * 2)
 
 @given(theta=angles, omega=rates)
 def test_pinned_driven_walker_moves_like_the_rigid_one(theta, omega):
-    """Written for the rigid model's own equations; the roles of the feet decide whose torque is whose."""
+    """The roles of the feet decide which leg a torque acts on."""
     config = loader.load(Path("paper"), [*SETTINGS, "walker.foot_radius_m=0"]).config
     rigid, y = rigid_walker(config, "corrected"), np.array((*theta, *omega))
     expected = np.zeros(4)
@@ -72,7 +72,7 @@ def test_hip_torques_act_on_the_thighs_of_a_kneed_walker():
 
 
 def test_spring_work_equals_the_drop_of_its_energy():
-    """As in the rigid model; the energy balance counts what it stores."""
+    """The energy balance counts the energy stored in the spring, as in the rigid model."""
     config = loader.load(Path("paper"), ["slope_deg=3", SETTINGS[0], "contact.terrain=after-mid-swing"]).config
     gait = find_gaits(rigid_walker(config, "corrected")).gait
     scene = contact_scene(config, gait.step_length)

@@ -1,4 +1,4 @@
-"""Tests of the IMPACT law and of STEP, which blends in its damping."""
+"""Tests of the IMPACT law and of STEP, the function by which its damping sets in."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_step_function_is_flat_outside_and_smooth_at_its_ends(x0, width, h0, h1)
 
 
 def test_step_function_is_the_cubic_with_those_ends():
-    """The only cubic with given values and flat ends, from its four conditions."""
+    """Two values and two flat ends are four conditions, which only one cubic meets."""
     x0, h0, x1, h1 = 0.3, -1.0, 1.1, 4.0
     conditions = [[x**3, x**2, x, 1.0] for x in (x0, x1)] + [[3 * x**2, 2 * x, 1.0, 0.0] for x in (x0, x1)]
     cubic = np.linalg.solve(conditions, [h0, h1, 0.0, 0.0])
@@ -56,7 +56,7 @@ def test_normal_force_is_never_adhesive(law, depth, rate):
 
 @given(law=laws, depth=depths, rate=rates)
 def test_damping_only_dissipates_energy(law, depth, rate):
-    """(F - k d^e) d' >= 0, also where the clip at zero cuts the damping short."""
+    """The power (F - k d^e) d' is never negative, even where the clip at zero cuts the damping short."""
     normal = normal_force(law, depth, rate)
     assert (normal.force - normal.spring) * rate >= -1e-12 * normal.spring * abs(rate)
 
@@ -85,7 +85,7 @@ def test_derivatives_of_the_normal_force_equal_finite_differences(law, fraction,
     normal = normal_force(law, depth, rate)
     h = 1e-5 * depth
     pulled = [normal_force(law, depth + step, rate).force == 0.0 for step in (-h, h)]
-    assume(not any(pulled) and abs(fraction - 1.0) > 1e-3)  # no join of the law between
+    assume(not any(pulled) and abs(fraction - 1.0) > 1e-3)  # no switching point of the law between the two points
     by_depth = (normal_force(law, depth + h, rate).force - normal_force(law, depth - h, rate).force) / (2 * h)
     size = (normal.spring + law.damping * abs(rate)) / depth
     assert normal.by_penetration == pytest.approx(by_depth, rel=1e-6, abs=1e-7 * size)
@@ -104,7 +104,9 @@ def test_normal_force_and_its_derivative_are_continuous_at_full_damping(rate):
 
 @pytest.mark.parametrize("rate", [-1.0, 1.0])
 def test_force_starts_at_zero_at_first_touch(rate):
-    """No force, no spring and no damping at zero penetration: a touch is no jump, whatever the speed."""
+    """At zero penetration there is neither elastic force nor damping, so the force does not jump at a touch of any
+    speed.
+    """
     law = Impact(4e11, 2.2, 9e4, 1e-4)
     forces = [normal_force(law, d, rate).force for d in (1e-7, 1e-8, 1e-9)]
     assert forces == sorted(forces, reverse=True)
@@ -112,7 +114,7 @@ def test_force_starts_at_zero_at_first_touch(rate):
 
 
 def test_normal_law_is_consistent_in_its_units():
-    """N/mm^e and mm against N/m^e and m."""
+    """Compare the law in N/mm^e and mm with the law in N/m^e and m."""
     k, e, c, d_max = 1e5, 2.2, 90.0, 0.1
     law = Impact(k * 1000.0**e, e, c * 1000.0, d_max / 1000.0)
     depth_mm, rate_mm_s = 0.06, 12.0

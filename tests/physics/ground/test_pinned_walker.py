@@ -1,4 +1,6 @@
-"""Check that a walker pinned at its stance foot moves as in the rigid swing, on a leg down to the ball's centre."""
+"""Check that a walker pinned at the stance foot moves as in the rigid swing of legs that end at the centres of the
+balls.
+"""
 
 import math
 
@@ -24,7 +26,7 @@ def pinned(radius=0.001, inertia=0.0, foot=1, has_ground=False):
 
 @given(state=states, radius=radii, inertia=inertias)
 def test_pinned_walker_is_the_rigid_swing_with_a_leg_shorter_by_the_radius(state, radius, inertia):
-    """The hinge is the centre of the ball: L - r from the hip, a - r from the leg's mass."""
+    """The hinge is the centre of the ball, which is L - r from the hip and a - r from the mass of the leg."""
     rigid = RigidWalker(1.0 - radius, 0.5 - radius, 5.0, 10.0, inertia, ground.GRAVITY, ground.SLOPE, CORRECTED)
     found = rate_of(pinned(radius, inertia), state)
     expected = (*state[2:], *accelerations(rigid, *state))
@@ -66,13 +68,14 @@ def test_derivatives_of_a_pinned_stance_are_correct_with_the_other_foot_in_the_g
     angle, depth, swing, stance, foot
 ):
     system = pinned(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
-    # legs that end at the balls' centres: by as much as the swing leg reaches further down
+    # The legs end at the centres of the balls. The swing foot is as deep in the ground as its centre is below the
+    # hinge.
     other = -math.acos(math.cos(angle) + depth / 0.99)
     legs = np.array([[other, angle], [swing, stance]])[:, :: 1 if foot == 1 else -1]
     legs[0] -= system.form.slope
     state = tuple(legs.ravel().tolist())
     without = np.array(rate_of(system._replace(has_ground=np.zeros(2, np.int8)), state))
-    # a foot that rises fast is let go
+    # The ground lets go of a foot that rises fast.
     assume(np.abs(np.array(rate_of(system, state)) - without).max() > 1.0)
     check_jacobian(system, state)
 
@@ -85,7 +88,7 @@ def test_hinge_stays_fixed_and_the_foot_just_touches(state, radius):
     assert motion.along == pytest.approx(0.0, abs=1e-12)
     assert motion.height == pytest.approx(0.0, abs=1e-12)
     assert motion.vertical_velocity == pytest.approx(0.0, abs=1e-12)
-    assert motion.slip == pytest.approx(radius * state[3], abs=1e-12)  # the ball turns over the hinge
+    assert motion.slip == pytest.approx(radius * state[3], abs=1e-12)  # The ball turns about the hinge.
     assert (full[2:4], full[6:]) == (state[:2], state[2:])
 
 

@@ -1,4 +1,4 @@
-"""Tests of pads in lanes, and of the plane that lets scuffing feet through."""
+"""Tests of pads in lanes, and of the plane that scuffing feet pass through."""
 
 import math
 
@@ -22,7 +22,7 @@ feet = st.sampled_from([0, 1])
 
 
 def walked_on(pitch):
-    """Lanes as a walk lays them: the first stance foot (1) stands at 0, the other one pitch behind it."""
+    """Return lanes as a walk lays them. Foot 1, which stands first, is at 0, and the other foot one pitch behind it."""
     return checkerboard(pitch, (-pitch, 0.0))
 
 
@@ -45,7 +45,9 @@ def test_cells_tile_the_ground_without_gap_or_overlap(pitch, foot, cell):
 
 @given(pitch=pitches, j=st.integers(-20, 20))
 def test_pads_of_each_leg_are_centred_on_its_footholds(pitch, j):
-    """The stance leg's on s = 2 j S, the other's on s = (2 j + 1) S; where one has a pad the other has none."""
+    """Pads of the first stance leg are at s = 2 j S, those of the other leg at s = (2 j + 1) S. Where one leg has a
+    pad, the other has none.
+    """
     terrain = walked_on(pitch)
     for foothold, foot in ((2 * j * pitch, 1), ((2 * j + 1) * pitch, 0)):
         cell = cell_at(terrain, foot, foothold)
@@ -79,9 +81,10 @@ def test_foot_on_a_plane_is_supported_only_after_swinging_ahead_in_the_air():
     terrain = after_mid_swing(0.4)
     assert terrain.order_matters
     assert starts_with_ground(terrain, True)
-    assert not starts_with_ground(terrain, False)  # it is about to swing
-    assert not has_ground_in_air(terrain, True, False, False)  # leaves its stance, or fell back, behind: swings through
-    assert has_ground_in_air(terrain, True, False, True)  # bounces at its landing
-    assert not has_ground_in_air(terrain, False, False, False)  # scuffs behind
-    assert has_ground_in_air(terrain, False, False, True)  # has passed, in the air
-    assert has_ground_in_air(terrain, True, True, False)  # the stance foot bounces
+    assert not starts_with_ground(terrain, False)  # The foot is about to swing.
+    # It leaves the ground behind the stance foot, so it swings through.
+    assert not has_ground_in_air(terrain, True, False, False)
+    assert has_ground_in_air(terrain, True, False, True)  # It bounces as it lands.
+    assert not has_ground_in_air(terrain, False, False, False)  # It scuffs behind the stance foot.
+    assert has_ground_in_air(terrain, False, False, True)  # It has passed the stance foot in the air.
+    assert has_ground_in_air(terrain, True, True, False)  # The stance foot bounces.

@@ -1,4 +1,4 @@
-"""Walks on compliant ground for tests, with configs changed as by --set and with changed starts."""
+"""Walks on compliant ground for tests, with config keys changed as by --set, or with another start."""
 
 import functools
 
@@ -15,7 +15,7 @@ PLENTY = 10_000_000
 
 
 def faster(factor, start=FIXED_POINT):
-    """The start with both velocities times a factor."""
+    """Return the start with both velocities multiplied by a factor."""
     return (*start[:2], factor * start[2], factor * start[3])
 
 
@@ -31,6 +31,6 @@ def settings(tolerance=TOLERANCE, method="radau5", budget=PLENTY):
 
 @functools.cache
 def walked(*sets, start=FIXED_POINT, steps=10, step=RIGID_STEP, interval=None, **method):
-    """A walk in the paper's scene at 1 deg, changed by `sets`."""
+    """Simulate a walk in the paper's scene at 1 deg, with the settings `sets`."""
     scene = scene_of(*sets, step=step)
     return scene.walk(start_state(scene, start), steps, settings(**method), interval)

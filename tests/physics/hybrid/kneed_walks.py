@@ -13,17 +13,17 @@ from walkerlab.scene.parts import Arc, Limb, kneed_legs
 
 THIGH, SHANK, HIP_MASS = Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5
 MASS, PAPER_MASS, GRAVITY, SLOPE = 1.6, 20.0, 9.81, 0.0504
-# its rigid gait just after heel strike, from the slope's normal, recomputed: half the angle between the legs, rates
+# rigid gait just after heel strike, recomputed: half the angle between the legs, and the rates
 HALF, STANCE_RATE, SWING_RATE = 0.2385854603, -1.1095873312, -0.0571481063
 PERIOD, STEP = 0.564328, 2.0 * np.sin(HALF)
 ANGLES = (-HALF - SLOPE, HALF - SLOPE) * 2  # thighs, then shanks
 RATES = (SWING_RATE, STANCE_RATE) * 2
-# as the rigid model counts: swing thigh, straight stance leg, swing shank
+# in the order of the rigid model: swing thigh, straight stance leg, swing shank
 RIGID_ANGLES, RIGID_RATES = (*ANGLES[:2], ANGLES[0]), (*RATES[:2], RATES[0])
 
 
 def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **contact):
-    """The walker on plane ground; `scale` makes every length so many times larger, at the same gravity."""
+    """Return the walker on plane ground. `scale` multiplies every length, with the same gravity."""
     limbs = [Limb(scale * x.length_m, x.mass_kg, scale * x.mass_below_m) for x in (THIGH, shank)]
     law = {
         "units": "si", "stiffness": 1e5 * 1000.0**2.2 * MASS / PAPER_MASS / scale**2.2,
@@ -39,7 +39,7 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
 
 @functools.cache
 def walked(steps=3, rules=None, interval=None, tolerance=1e-8, scale=1.0, **changes):
-    """A walk from the rigid gait."""
+    """Simulate a walk that starts in the rigid gait."""
     scene = scene_of(rules, scale=scale, **changes)
     start = start_state(scene, (*RIGID_ANGLES, *(rate / scale**0.5 for rate in RIGID_RATES)))
     return scene.walk(start, steps, settings(tolerance), interval)

@@ -12,21 +12,21 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-# all in one file, by whose time and size numba knows what is stale
+# All code is in one file: numba finds out by its time and size whether compiled code is stale.
 njit = partial(numba.njit, cache=True, error_model="numpy", no_cfunc_wrapper=True)
-inner = partial(njit, no_cpython_wrapper=True)  # called by compiled code alone
+inner = partial(njit, no_cpython_wrapper=True)  # for functions that only compiled code calls
 
 CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
 WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE, STUBBED = 0, 1, 2, 3, 4, 5, 9, 10
-# rows of events: two feet of (height, left edge, right edge), feet passing, hip, slide, two knees, sinking
+# order of the events: for both feet (height, left edge, right edge), then feet passing, hip, slide, two knees, sinking
 PASSING, FALL, SLIDE, KNEES, SINKING, EVENTS = 6, 7, 8, 9, 11, 12
-ARMED = 0.01  # rad of flexion from which on a knee locks
+ARMED = 0.01  # rad; a knee can lock after it was flexed by more than this
 ROUNDING = 1e-12  # s, m
 HALVINGS = 60
-REACTION = 2e-4  # s; where the ground reacts at a rate r (1/s) a step is 1 + r * REACTION times shorter
-CHANNELS = ("damping", "friction", "edges", "knee strikes")  # what work is lost to
+REACTION = 2e-4  # s; if the ground reacts at a rate r (1/s), a step is 1 + r * REACTION times shorter
+CHANNELS = ("damping", "friction", "edges", "knee strikes")  # where energy is lost
 DAMPING, FRICTION, EDGES, KNEE_STRIKES = 0, 1, 2, 3
-STEPS, SLIPS, LOCKS, ROUNDS = 0, 1, 2, 3  # counts of a diary
+STEPS, SLIPS, LOCKS, ROUNDS = 0, 1, 2, 3  # indices of the counts in a diary
 
 
 class Plain(NamedTuple):
@@ -37,7 +37,7 @@ class Plain(NamedTuple):
     inertias: np.ndarray  # (n,)
     foot_levers: np.ndarray  # (2, n, 2) to the centres of the balls
     foot_bodies: np.ndarray  # (2,)
-    radii: np.ndarray  # (2,) of the balls
+    radii: np.ndarray  # (2,) m, of the balls
     knees: np.ndarray  # (knees, 2) thigh and shank
     leg: float
     gravity: float
@@ -57,11 +57,12 @@ class Plain(NamedTuple):
     hip: np.ndarray = np.zeros(3)
     push_offs: np.ndarray = np.zeros(2)  # (2,) N s, of each foot
     push_off_duration: float = 1.0  # s
-    heights: np.ndarray = np.zeros(1)  # (footholds,) m over the slope, the start's first; those beyond lie at the last
+    # (footholds,) m above the slope, beginning with the start's; footholds beyond the list have the last height
+    heights: np.ndarray = np.zeros(1)
 
 
 class Now(NamedTuple):
-    """The current holds and pushes: pinned foot, locked knees, pulses."""
+    """What currently holds and pushes the walker: pinned foot, locked knees, pulses."""
 
     stance: int
     pinned: int  # foot, or -1
@@ -77,15 +78,15 @@ class Walked(NamedTuple):
     outcome: int
     times: np.ndarray  # (steps,) s of touches
     places: np.ndarray  # (steps,) m
-    slips: np.ndarray  # (steps,) m, or one fewer where the last foot did not lift
-    rolled: np.ndarray  # likewise
+    slips: np.ndarray  # (steps,) m, or one fewer if the last foot did not lift
+    rolled: np.ndarray  # (steps,) m, or one fewer
     locks: np.ndarray  # s, of knees
     end_s: float
     end: np.ndarray
     ground: np.ndarray  # (2,) whether each foot had ground there
     levels: np.ndarray  # (2,) m, how high
     lost: np.ndarray  # (4,) J
-    rounds: int  # steps of the method
+    rounds: int  # number of steps of the method
 
 
 class Diary(NamedTuple):
@@ -101,7 +102,7 @@ class Diary(NamedTuple):
 
 
 def straight_legs(leg, foot_to_mass, leg_mass, hip_mass, radius, inertia=0.0):
-    """Masses, levers, inertias, foot levers and bodies of two straight legs."""
+    """Return masses, levers, inertias, foot levers and bodies of two straight legs."""
     levers = np.zeros((3, 2, 2))
     levers[0, 0, 1] = levers[1, 1, 1] = foot_to_mass - leg
     feet = np.zeros((2, 2, 2))
@@ -113,7 +114,7 @@ def straight_legs(leg, foot_to_mass, leg_mass, hip_mass, radius, inertia=0.0):
 
 
 def kneed_legs(thigh, thigh_mass_at, thigh_mass, shank, shank_mass_at, shank_mass, hip_mass, radius):
-    """Return the same for two legs of thigh (bodies 0, 1) and shank (2, 3); masses are given below hip and knee."""
+    """Return the same for two legs of thigh (bodies 0, 1) and shank (2, 3). Masses are given below hip and knee."""
     levers, feet = np.zeros((5, 4, 2)), np.zeros((2, 4, 2))
     for k in range(2):
         levers[k, k, 1] = -thigh_mass_at
@@ -124,8 +125,8 @@ def kneed_legs(thigh, thigh_mass_at, thigh_mass, shank, shank_mass_at, shank_mas
 
 
 def replace_second_leg(first, second):
-    """The same of the first leg of one pair and the second leg of another on the same hip."""
-    # masses, levers, bodies and feet of the two legs take turns
+    """Return the same for the first leg of one pair and the second leg of another pair on the same hip."""
+    # In all arrays, entries of the two legs take turns.
     turns = [np.arange(len(own)) % 2 == 1 for own in first[:6]]
     legs = [
         np.where(odd.reshape(-1, *[1] * (own.ndim - 1)), other, own)
@@ -143,10 +144,10 @@ def cubic(x, x0, h0, x1, h1):
 
 @njit
 def turned(slope, levers, i, y, k):
-    """Return one body's part of the way from the hip to a mass or foot."""
+    """Return the contribution of one body to the lever from the hip to a mass or foot."""
     a, ahead, up = y[2 + k] + slope, levers[i, k, 0], levers[i, k, 1]
     if ahead == 0.0 and up == 0.0:
-        return 0.0, 0.0  # most masses hang on few of the bodies
+        return 0.0, 0.0  # Most masses depend on few bodies, so this saves much time.
     return np.cos(a) * ahead - np.sin(a) * up, np.sin(a) * ahead + np.cos(a) * up
 
 
@@ -165,7 +166,7 @@ def foot_at(walker, foot, y):
 
 @inner
 def solve(A, b):
-    """Solve linear equations in place, by Gauss's method with pivots."""
+    """Solve linear equations in place by Gaussian elimination with pivots."""
     size = b.size
     for k in range(size):
         pivot = k
@@ -191,7 +192,9 @@ def solve(A, b):
 
 @inner
 def matrices(walker, now, y):
-    """Mass matrix with the rows of what is held, and the forces of weight and turning; room for multipliers."""
+    """Return the mass matrix with the rows of the constraints, and the gravity and velocity forces, with room for
+    multipliers.
+    """
     n, knees = walker.inertias.size, walker.knees.shape[0]
     pinned, locked = now.pinned, now.locked
     size = 2 + n + (2 if pinned >= 0 else 0) + locked.sum()
@@ -243,7 +246,7 @@ def push(walker, foot, y, b, along, upward):
 
 @inner
 def push_off(walker, now, t, y, b):
-    """The trailing leg's pulse, along the line from where its foot touches to the hip."""
+    """Add the pulse of the trailing leg, which acts along the line from the contact point of its foot to the hip."""
     u, foot = (t - now.pushed_at) / walker.push_off_duration, 1 - now.stance
     if not 0.0 < u < 1.0 or walker.push_offs[foot] == 0.0:
         return
@@ -255,7 +258,7 @@ def push_off(walker, now, t, y, b):
 
 @inner
 def rate(walker, now, t, y):
-    """dy/dt."""
+    """Return dy/dt."""
     n = walker.inertias.size
     A, b = matrices(walker, now, y)
     dy = np.zeros_like(y)
@@ -286,7 +289,9 @@ def rate(walker, now, t, y):
 
 @inner
 def reaction(walker, now, y):
-    """How fast (1/s) the ground reacts to a foot's velocity, and a foot crosses the depth where damping sets in."""
+    """Return the largest rate (1/s) at which the ground reacts to the velocity of a foot, or at which a foot crosses
+    the depth where damping sets in.
+    """
     n, fastest = walker.inertias.size, 0.0
     for foot in range(2):
         _, h, _, vertical_velocity, _ = foot_at(walker, foot, y)
@@ -311,7 +316,7 @@ def reaction(walker, now, y):
 
 @inner
 def runge_kutta(walker, now, t, y, h):
-    """One step of the classical method."""
+    """Take one step of the classical method."""
     k1 = rate(walker, now, t, y)
     k2 = rate(walker, now, t + 0.5 * h, y + 0.5 * h * k1)
     k3 = rate(walker, now, t + 0.5 * h, y + 0.5 * h * k2)
@@ -321,7 +326,7 @@ def runge_kutta(walker, now, t, y, h):
 
 @inner
 def struck(walker, now, y):
-    """Return the state after a plastic impact, in which only the hinge and locked joints take impulses."""
+    """Return the state after a plastic impact, in which only the hinge and locked joints transmit impulses."""
     n = walker.inertias.size
     A, b = matrices(walker, now, y)
     b[:] = 0.0
@@ -333,14 +338,14 @@ def struck(walker, now, y):
 
 @inner
 def stored(walker, foot, level, y):
-    """Energy (J) in the ground under a foot, whose surface is at a level (m)."""
+    """Return the energy (J) stored in the ground under a foot. The surface is at `level` (m)."""
     depth = max(0.0, level - foot_at(walker, foot, y)[1])
     return walker.stiffness * depth ** (walker.exponent + 1.0) / (walker.exponent + 1.0)
 
 
 @njit
 def energy(walker, has_ground, levels, y):
-    """Energy (J) of motion, of weight over the slope's first foothold, and in the ground."""
+    """Return the sum (J) of kinetic energy, potential energy above the first foothold, and energy in the ground."""
     n = walker.inertias.size
     total = 0.0
     for i in range(walker.masses.size):
@@ -360,7 +365,7 @@ def energy(walker, has_ground, levels, y):
 
 @inner
 def material(walker, foot, y):
-    """Return where a foot would be if it had not rolled."""
+    """Return where along the slope a foot would be if it had not rolled."""
     return foot_at(walker, foot, y)[0] + walker.radii[foot] * y[2 + walker.foot_bodies[foot]]
 
 
@@ -372,7 +377,7 @@ def lane(walker, foot):
 
 @inner
 def event_values(walker, now, y, cells, touched):
-    """Every event function."""
+    """Return the values of all event functions."""
     g = np.ones(EVENTS)
     x = np.zeros(2)
     for foot in range(2):
@@ -394,7 +399,9 @@ def event_values(walker, now, y, cells, touched):
 
 @inner
 def set_level(walker, levels, side, foot, level, y):
-    """Move the ground under a foot, which may then be inside it. Return the energy (J) that its spring held."""
+    """Move the ground under a foot to another level, which may be above the foot. Return the energy (J) that its spring
+    held.
+    """
     held = stored(walker, foot, levels[foot], y) if side[3 * foot] < 0.0 else 0.0
     if level == levels[foot]:
         return 0.0
@@ -405,19 +412,19 @@ def set_level(walker, levels, side, foot, level, y):
 
 @inner
 def next_level(walker, done):
-    """Height (m) of the swing foot's next foothold."""
+    """Return the height (m) of the next foothold of the swing foot."""
     return walker.heights[min(done + 1, walker.heights.size - 1)]
 
 
 @inner
 def changes_level(walker, levels, done, foot):
-    """Whether the ground for a foot that comes ahead on a plane has yet to take the height of its next foothold."""
+    """Whether the ground still has to take the height of the next foothold of a foot that gets ahead on a plane."""
     return walker.terrain != CHECKERBOARD and levels[foot] != next_level(walker, done)
 
 
 @njit
 def take_steps(walker, y, h, pinned, diary):
-    """Walk from y, foot 1 standing, `pinned` or not (-1), until the diary is full or the walk ends.
+    """Walk from y until the diary is full or the walk ends. Foot 1 stands first, and `pinned` is the pinned foot or -1.
 
     Then walk on until the last step's foot lifts, if it does: a slip is from touch to lift. Returns outcome, time and
     state at the end, and whether each foot had ground there and at which level.
@@ -539,14 +546,15 @@ def take_steps(walker, y, h, pinned, diary):
             for foot in range(2):
                 _, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
                 height -= levels[foot]
-                # equal legs of a pinned step pass each other on the ground: rounding neither lifts a foot nor holds one
+                # Equal legs of a pinned step pass each other on the ground, where rounding must neither lift a foot nor
+                # hold it.
                 above = height > ROUNDING or (height > -ROUNDING and vertical_velocity > 0.0)
                 if foot == swing:
                     swing_above = above
                 if walker.terrain == AFTER_MID_SWING and above and foot != stance:
                     has_ground[foot] = (side[PASSING] > 0.0) == (foot == 1)
             ahead = (side[PASSING] > 0.0) == (swing == 1)
-            # the next foothold counts, unless the foot stands in the ground
+            # The next foothold counts unless the foot is still in the ground.
             if ahead and (swing_above or not has_ground[swing]) and changes_level(walker, levels, done, swing):
                 set_level(walker, levels, side, swing, next_level(walker, done), y)
                 has_ground[swing] = side[3 * swing] > 0.0
@@ -636,7 +644,9 @@ def take_steps(walker, y, h, pinned, diary):
 
 
 def walk(walker, y, steps, h, pinned=-1):
-    """Walk up to `steps` steps from y in steps of the method of h (s) at most, foot `pinned` pinned until the first."""
+    """Walk up to `steps` steps from y. The method takes steps of at most h (s), and foot `pinned` is pinned until the
+    first touch.
+    """
     locks, counts = np.zeros(2 * steps + 2), np.zeros(4, np.int64)
     diary = Diary(*np.zeros((4, steps)), locks, counts, np.zeros(4))
     outcome, end_s, end, ground, levels = take_steps(walker, y, h, pinned, diary)
@@ -661,7 +671,7 @@ def of_centre(walker, y):
 
 
 def start(walker, angles, rates, pinned=False):
-    """The state with foot 1 just touching at the origin, at rest and rolling, or pinned at its centre."""
+    """Return the state in which foot 1 just touches at the origin and rolls, or is pinned at its centre."""
     n = walker.inertias.size
     y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates, [0.0, 0.0]]).astype(float)
     x, height, slip, vertical_velocity, centre = foot_at(walker, 1, y)

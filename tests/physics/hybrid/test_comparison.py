@@ -24,7 +24,7 @@ PHASES = np.linspace(0.0, 1.0, 101)
 
 
 def legs_at(u, side):
-    """Angles at u periods, and their derivative by u on one side of the kinks at whole numbers."""
+    """Return the angles after u periods, and their derivative by u on one side of the kinks at whole numbers."""
     wave = np.sign(np.sin(np.pi * (u + 1e-9 * side)))
     lean = KINK * np.abs(np.sin(np.pi * u))
     angle = np.column_stack((0.2 * np.cos(np.pi * u) + lean, -0.2 * np.cos(np.pi * u) + lean))
@@ -34,7 +34,7 @@ def legs_at(u, side):
 
 
 def walk(period=PERIOD, steps=STEPS, interval=0.004, shift=0.0):
-    """A walk with both sides of each kink sampled, from `shift` periods on."""
+    """Return a walk that begins after `shift` periods and has a sample on either side of each kink."""
     strikes = period * np.arange(1, steps + 1)
     grid = np.arange(0.0, strikes[-1] - 1e-6, interval)
     grid = grid[np.abs(grid[:, None] - strikes).min(axis=1) > 1e-6]
@@ -59,7 +59,7 @@ def test_angles_of_a_stretched_copy_differ_in_time_but_not_in_phase():
     copy = walk(period=1.01 * PERIOD)
     _, in_time = difference_in_time(copy, walk())
     in_phase = difference_in_phase(copy, walk(), PHASES)
-    assert max(in_phase.largest("angle")) < 1e-7  # fourth order in the sampling interval
+    assert max(in_phase.largest("angle")) < 1e-7  # The error is of fourth order in the sampling interval.
     assert min(in_time.largest("angle")) > 0.5 * (STEPS * 0.01) * np.pi * 0.2
 
 
@@ -109,7 +109,9 @@ def test_phase_and_orbit_comparisons_reject_walks_without_a_full_step_or_stride(
 
 
 def rough(interval, impact):
-    """A walk without samples at the step's end, whose velocity changes within `impact` after it: falls, then rises."""
+    """Return a walk without samples at the end of a step. Its velocity falls until the strike, then rises from -1 to 1
+    within `impact`.
+    """
     time = np.arange(0.0, 1.0, interval)
     after = np.maximum(time - 0.5, 0.0)
     angle = np.where(time < 0.5, -(time**2), -(0.5**2) + after)
@@ -126,14 +128,15 @@ def test_touch_between_samples_is_extrapolated_from_before_the_impact():
     assert abs(smeared + 1.0).min() > 0.1
 
 
-def test_walk_with_samples_at_its_heel_strikes_is_unchanged():
+def test_samples_at_heel_strikes_need_no_extrapolation():
     motion = walk()
     assert add_strike_samples(motion) is motion
 
 
 @pytest.mark.parametrize("shift", [2.0, 4.0])
 def test_orbit_of_a_time_shifted_copy_is_the_same(shift):
-    assert orbit_distances(walk(shift=shift), walk(interval=0.0037)).max() < 1e-3  # second order in the interval
+    # The error is of second order in the interval.
+    assert orbit_distances(walk(shift=shift), walk(interval=0.0037)).max() < 1e-3
 
 
 def test_orbit_distance_between_circles_is_relative_to_the_range():
@@ -163,7 +166,7 @@ def test_phase_plane_shows_angle_and_velocity_of_the_leg():
 
 
 def locking(at, interval=0.003):
-    """A walk of one step whose velocity jumps from -1 to 1 at a knee strike between samples."""
+    """Return a walk of one step whose velocity jumps from -1 to 1 at a knee strike between samples."""
     time = np.append(np.arange(0.0, 1.0, interval), 1.0)
     angle, velocity = np.abs(time - at), np.sign(time - at)
     return Motion(

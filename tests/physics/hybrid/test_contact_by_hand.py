@@ -23,21 +23,27 @@ def friction(slip):
 
 
 def upward(angle):
-    """From foot to hip along a leg, and how that turns with its angle, in axes along and up from the slope."""
+    """Return the direction from foot to hip along a leg and its derivative by the angle, in axes along and normal to
+    the slope.
+    """
     return np.array([-np.sin(angle + SLOPE), np.cos(angle + SLOPE)]), -np.array(
         [np.cos(angle + SLOPE), np.sin(angle + SLOPE)]
     )
 
 
 def foot(y, leg):
-    """Centre of a foot's ball and velocity of its lowest point; y is hip along and up, angles, and their rates."""
+    """Return the centre of a foot's ball and the velocity of its lowest point. y has the hip's position, the angles,
+    and their rates.
+    """
     up, turned = upward(y[2 + leg])
     centre = y[:2] - (LEG - RADIUS) * up
     return centre, y[4:6] + y[6 + leg] * (np.array([RADIUS, 0.0]) - (LEG - RADIUS) * turned)
 
 
 def on_pad(leg, along):
-    """Pads as long as a step, the swing leg's about a step behind the start and every second step from there."""
+    """Whether a foot is over its pads, which are as long as a step. The swing leg has them one step behind the start
+    and at every second step from there.
+    """
     from_middle = (along + (RIGID_STEP if leg == 0 else 0.0)) % (2.0 * RIGID_STEP)
     return min(from_middle, 2.0 * RIGID_STEP - from_middle) <= 0.5 * RIGID_STEP
 
@@ -77,7 +83,7 @@ def test_first_step_ends_as_hand_formulas_predict():
     y[4:6] -= velocity
     run = solve_ivp(motion, (0.0, 1.0), y, "Radau", rtol=1e-9, atol=1e-11, events=swing_foot_comes_down, max_step=5e-3)
     step = walked(steps=1, tolerance=1e-9)
-    # ten times what SciPy is asked for
+    # ten times the tolerance requested from SciPy
     assert run.t[-1] == pytest.approx(step.touch_time_s[0], abs=1e-8)
     assert foot(run.y[:, -1], 0)[0][0] == pytest.approx(step.touch_along_m[0], abs=1e-8)
     assert run.y[2:4, -1] == pytest.approx(step.end_state[2:4], abs=1e-8)

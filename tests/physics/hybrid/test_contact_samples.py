@@ -1,4 +1,4 @@
-"""Check that the samples of a walk on compliant ground show the walk and do not change it."""
+"""Check that samples of a walk on compliant ground agree with the walk and do not change it."""
 
 import numpy as np
 import pytest

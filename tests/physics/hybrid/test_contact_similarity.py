@@ -1,4 +1,4 @@
-"""Check that place, leg and units make no difference to a walk on compliant ground."""
+"""Check that a walk on compliant ground does not depend on its position, its first leg or its units."""
 
 import math
 
@@ -39,7 +39,9 @@ FORCE, TIME = MASS * GRAVITY, math.sqrt(LENGTH / GRAVITY)
 
 
 def twin(static, dynamic):
-    """The paper's walker on the Moon: other leg length, masses and gravity, the contact scaled with them."""
+    """Return the paper's walker on the Moon, with other leg length, masses and gravity, and the contact scaled to
+    match.
+    """
     speed = LENGTH / TIME
     return (
         f"walker.leg_length_m={LENGTH}",

@@ -87,7 +87,8 @@ def test_steeper_slopes_scuff_earlier_and_allow_fewer_steps():
     start = (-0.3233886, 0.2186688, -0.3773739, -1.0923836)
     walk = walked("slope_deg=3", start=start, step=0.5354454, steps=12)
     assert walk.outcome is Outcome.OFF_PAD
-    assert 8 <= walk.periods_s.size <= 9  # the pad's edge is missed by a tenth of a millimetre after the eighth
+    # After the eighth step, the foot misses the edge of the pad by a tenth of a millimetre.
+    assert 8 <= walk.periods_s.size <= 9
 
 
 def test_slippery_ground_shortens_five_steps_and_then_trips_the_walker():
@@ -108,7 +109,7 @@ def slid_foot(tolerance, start):
     assert walk.outcome is Outcome.SLID
     begin = feet_motion(scene.walker.whole, start_state(scene, start))[STANCE_FOOT]
     end = feet_motion(scene.walker.whole, walk.end_state)[STANCE_FOOT]
-    # the ball has also rolled, by its radius times the change of the leg's angle
+    # The ball has also rolled by its radius times the change of the leg angle.
     turned = walk.end_state[2 + STANCE_FOOT] - start[STANCE_FOOT]
     return abs(end.along - begin.along + RADIUS * turned), end.height, farthest_slide(scene.ground.terrain)
 
@@ -117,7 +118,7 @@ def slid_foot(tolerance, start):
 def test_walk_ends_when_its_loaded_stance_foot_slides_too_far(tolerance):
     away, height, farthest = slid_foot(tolerance, (*FIXED_POINT[:2], 0.0, 0.0))
     assert height < -1e-5
-    # located to 1e-12 s at a few m/s
+    # The event is located to 1e-12 s, and the foot moves at a few m/s.
     assert away == pytest.approx(farthest, abs=1e-11)
 
 
@@ -129,7 +130,9 @@ def test_walk_ends_when_its_stance_foot_lands_too_far_away(tolerance):
 
 
 def test_nearly_rigid_contact_gives_almost_the_rigid_gait():
-    """Stiffness and damping 10^4 times, stiction at 0.1 mm/s, and a point foot, as the rigid model has it."""
+    """Stiffness and damping are 10^4 times larger, the stiction velocity is 0.1 mm/s, and the feet are points as in the
+    rigid model.
+    """
     walk = walked(*NEAR_RIGID, "walker.foot_radius_m=0")
     assert walk.outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.periods_s, RIGID_PERIOD, atol=1e-4)
@@ -158,11 +161,11 @@ def test_energy_balance_closes(sets):
 
 
 def test_potential_energy_lost_downhill_equals_the_ground_losses():
-    """A settled gait loses per step the weight's work along the slope."""
+    """In a steady gait, each step loses as much energy as gravity supplies along the slope."""
     walk = walked(OWN_PITCH, steps=40, interval=0.01)
     weight_along = 20.0 * 9.81 * math.sin(math.radians(1.0))
     lost = walk.samples.dissipated_J.sum(axis=1)
-    # read in the middle of two swings twenty steps apart, where little is lost
+    # Read both in the middle of a swing, where little is lost, twenty steps apart.
     late, early = (np.interp(walk.touch_time_s[i] + 0.35, walk.samples.time_s, lost) for i in (-2, -22))
     way = walk.touch_along_m[-2] - walk.touch_along_m[-22]
     assert late - early == pytest.approx(weight_along * way, rel=1e-5)
@@ -177,7 +180,7 @@ def test_touch_times_converge_with_the_tolerance():
 
 
 def test_single_support_agrees_with_scipy_radau():
-    """The same motion, integrated by another program from the start to before the swing foot leaves its pad."""
+    """SciPy integrates the same motion from the start until just before the swing foot leaves its pad."""
     scene = scene_of()
     system = place_on_ground(scene.walker, (True, True))
     start = np.array(start_state(scene, FIXED_POINT))
@@ -226,7 +229,7 @@ def test_exhausted_budget_ends_the_walk_with_advice():
 
 
 def test_walk_continues_on_a_plane_that_ignores_scuffing():
-    """Compiled code is not needed for this: SciPy's method walks the same source in Python."""
+    """The walk runs in Python with SciPy's method, so nothing is compiled."""
     plane = walked("contact.terrain=after-mid-swing", method="scipy-radau", steps=3)
     pads = walked(method="scipy-radau", steps=3)
     assert plane.outcome is Outcome.WALKED
@@ -240,12 +243,14 @@ def test_walker_cannot_walk_on_smooth_ground():
 
 
 def test_pinned_first_step_equals_the_rigid_one_until_release():
-    """The ball's centre is the hinge: the rigid walk of a walker whose legs are shorter by the radius."""
+    """The hinge is the centre of the ball, so compare with the rigid walk of a walker whose legs are shorter by the
+    radius.
+    """
     walk = walked("contact.stance=pinned", "walker.foot_radius_m=0", method="scipy-radau", steps=2)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[0] == pytest.approx(RIGID_PERIOD, abs=2e-6)
     assert walk.lengths_m[0] == pytest.approx(RIGID_STEP, abs=2e-6)
-    assert walk.periods_s[1] > RIGID_PERIOD + 1e-3  # compliant ground from here on
+    assert walk.periods_s[1] > RIGID_PERIOD + 1e-3  # From here on the ground is compliant.
 
 
 @examples(max_examples=25)
@@ -279,7 +284,9 @@ BOUNCING = (
 
 
 def test_foot_left_on_the_surface_by_an_event_does_not_stall_the_walk():
-    """Hardly damped feet bounce on and on; rounding decides on which side of the surface an event leaves them."""
+    """Feet with little damping bounce many times, and rounding decides on which side of the surface an event leaves
+    them.
+    """
     walk = walked(*BOUNCING, steps=4, budget=300_000)
     assert walk.outcome is Outcome.WALKED
     assert walk.energy_balance_residual_J < 1e-6

@@ -1,4 +1,4 @@
-"""Check that walks without energy balance are rejected everywhere, except from methods under test."""
+"""Check that walks whose energy does not balance are rejected everywhere, except where methods are tested."""
 
 import contact_walks
 import numpy as np
@@ -18,18 +18,18 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim
 from walkerlab.scene.contact import start_state
 
-# m, rad, m/s, rad/s: the stance leg upright and the swing leg beside it, somewhere near the gait
+# m, rad, m/s, rad/s: a state near the gait, with the legs upright side by side
 FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])
 
 
 @pytest.fixture
 def nothing_explained(monkeypatch):
-    """Reject every energy residual that is not zero."""
+    """Let every energy residual that is not zero be rejected."""
     monkeypatch.setattr(contact_result, "RESIDUAL_FACTOR", 0.0)
 
 
 def test_walk_with_inconsistent_equations_is_rejected_with_its_residual():
-    """The pinned walker moves as one with a heavier hip would; its energy is its own."""
+    """The motion is that of a walker with a heavier hip, but the energy is computed without the extra mass."""
     scene, heavier = scene_of("contact.stance=pinned"), scene_of("contact.stance=pinned", "walker.hip_mass_kg=20")
     forms = scene.walker.forms.copy()
     forms[1] = heavier.walker.forms[1]
@@ -46,12 +46,12 @@ def test_walk_with_inconsistent_equations_is_rejected_with_its_residual():
     assert taken.outcome is Outcome.SOLVER_FAILED
     assert not taken.outcome.answered
     assert f"off by {taken.energy_balance_residual_J:.3g} J" in taken.advice
-    assert taken.energy_balance_residual_J > 0.01  # J: five kilograms differ by more than numbers do
+    assert taken.energy_balance_residual_J > 0.01  # J; an error of five kilograms is larger than any rounding
 
 
 def test_explained_residual_grows_with_the_tolerance():
     loose, tight = (contact_walks.walked(steps=1, tolerance=tolerance) for tolerance in (1e-5, 1e-8))
-    # what was turned into heat differs by little
+    # The energy turned into heat changes little.
     assert loose.explained_residual_J == pytest.approx(1e3 * tight.explained_residual_J, rel=1e-3)
     assert tight.energy_balance_residual_J < tight.explained_residual_J
 
@@ -83,7 +83,9 @@ def test_benchmark_judges_methods_by_their_errors_alone(nothing_explained):
 
 
 def test_energy_balance_of_dop853_closes_well_within_its_tolerance():
-    """A rule of order 5 on steps of order 8 left two hundredths here, and more than the whole on bouncing feet."""
+    """A rule of order 5 on steps of order 8 would leave a residual of two hundredths of the tolerance here, and more
+    than all of it with bouncing feet.
+    """
     walk = contact_walks.walked(steps=3, method="dop853")
     assert walk.energy_balance_residual_J < 1e-3 * walk.explained_residual_J
 

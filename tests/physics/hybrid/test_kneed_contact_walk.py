@@ -44,7 +44,7 @@ BENT_STATE = (0.1, 0.9, -0.2, 0.25, -0.6, 0.25, 0.3, -0.1, 1.4, -0.9, 2.5, -0.9)
 
 
 def exchanged(walk):
-    """Return the energy (J) that the ground and the knees took."""
+    """Return the energy (J) lost to the ground and to the knees."""
     return float(walk.dissipated_J.sum())
 
 
@@ -89,12 +89,12 @@ def test_independent_integration_has_the_same_lock_release_and_touch_times(rules
     np.testing.assert_allclose(walk.touch_along_m, other.places, atol=1e-6)
     np.testing.assert_allclose(walk.slip_m, other.slips, atol=1e-6)
     np.testing.assert_allclose(walk.knee_strike_time_s, other.locks, atol=1e-6)
-    # that time apart at the fastest body's few rad/s
+    # In the time by which both differ, the fastest body turns at a few rad/s.
     np.testing.assert_allclose(walk.end_state[2:6], other.end[2:6], atol=5e-6)
 
 
 def masses_of(state, slope=SLOPE):
-    """(mass, position, velocity) of all points, from hip, thighs and shanks."""
+    """Return (mass, position, velocity) of all point masses, computed from hip, thighs and shanks."""
     x, h, *rest = state
     angles, (v_x, v_h), rates = rest[:4], rest[4:6], rest[6:]
     up = [np.array([-np.sin(a + slope), np.cos(a + slope)]) for a in angles]
@@ -119,9 +119,9 @@ def spin(points, about, drift):
 
 
 def test_knee_lock_conserves_total_momentum_and_that_of_the_swing_leg():
-    """Momentum sums over the masses: of the whole, and of the leg whose knee locks about the hip that carries it."""
+    """Sum the momentum of all masses, and the angular momentum of the leg whose knee locks about the hip."""
     scene = scene_of()
-    state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # straight just now
+    state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # The knee has just become straight.
     after, lost, _ = lock_knee(scene.walker.whole, scene.walker.forms[0, 3], state)
     before_points, after_points = masses_of(state), masses_of(after)
     assert after[10] == pytest.approx(after[8], abs=1e-14)
@@ -132,7 +132,8 @@ def test_knee_lock_conserves_total_momentum_and_that_of_the_swing_leg():
     energy = [sum(0.5 * m * v @ v for m, _, v in points) for points in (before_points, after_points)]
     assert lost == pytest.approx(energy[0] - energy[1], rel=1e-12)
     assert lost > 0.0
-    # the hip passes forces only: seen from there the leg's turning changes by the hip's own jump in velocity alone
+    # The hip transmits no torque, so about the hip the angular momentum changes only because the velocity of the hip
+    # jumps.
     hip, jump = before_points[0][1], after_points[0][2] - before_points[0][2]
     leg = slice(1, 3)
     change = sum(
@@ -143,7 +144,7 @@ def test_knee_lock_conserves_total_momentum_and_that_of_the_swing_leg():
 
 
 def test_equations_of_a_locked_knee_equal_those_of_one_leg():
-    """Compared with the compass whose legs carry thigh and shank masses as one."""
+    """Compare with a compass whose legs have thigh and shank as one body."""
 
     scene = scene_of()
     legs = straight_legs(Limb(1.0, THIGH.mass_kg, THIGH.mass_below_m), HIP_MASS, Arc())
@@ -220,7 +221,9 @@ def test_stiff_knee_stop_walks_like_the_ideal_lock():
 
 
 def test_knee_stop_converges_to_the_ideal_lock_with_the_root_of_stiffness():
-    """At one damping ratio, fully developed far below the compression; when the knees lock, and the steps' ends."""
+    """The damping ratio is constant, and damping is full far below the compression. Compare the times of locks and of
+    step ends.
+    """
     ideal, stiffnesses = walked(steps=3), (1e3, 1e5, 1e7)
     laws = [Impact(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
     stopped = [walked(steps=3, rules=KneeRules(law)) for law in laws]
@@ -236,13 +239,13 @@ def test_kneed_contact_gait_is_the_one_that_a_long_walk_settles_on():
     answer = find_gait_from(scene.walker, scene.ground, settings(1e-10), start)
     assert answer.gait is not None, answer.reason
     gait = answer.gait
-    assert gait.z.size == 8  # height, two angles, two velocities, three angular velocities
+    assert gait.z.size == 8  # coordinates: height, two angles, two velocities, three angular velocities
     assert gait.step.period_s == pytest.approx(walk.periods_s[-1], abs=1e-6)
     assert gait.step.length_m == pytest.approx(walk.lengths_m[-1], abs=1e-6)
     assert gait.step.slip_m == pytest.approx(walk.slip_m[-2], abs=1e-6)
     assert gait.stable
     assert gait.step.dissipated_J.sum() == pytest.approx(gait.step.driven.gravity, rel=1e-6)
-    # what the rigid gait's are is not far off
+    # The multipliers are close to those of the rigid gait.
     assert abs(gait.multipliers[0]) == pytest.approx(abs(0.35257 + 0.55221j), abs=0.1)
 
 

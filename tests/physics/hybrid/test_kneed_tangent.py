@@ -25,7 +25,7 @@ def test_step_derivative_equals_finite_differences(rules):
         assert taken.outcome is Outcome.WALKED
         return taken
 
-    # height and vertical velocity of the standing foot are the contact's own, whose scale is far smaller
+    # Height and vertical velocity of the stance foot have the scale of the contact, which is far smaller.
     sizes = np.full(z.size, 1e-6)
     sizes[0] = 1e-8
     columns = []

@@ -18,12 +18,14 @@ from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.hybrid.contact_result import sample_feet
 
 MASS, DROP = 2.0, 0.1
-DAMPED = Impact(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
+DAMPED = Impact(2e5, 1.5, 40.0, 1e-4)  # The force of this law vanishes before the ball has left the ground.
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
 def test_damping_loss_of_a_bounce_equals_the_lost_height(rtol):
-    """In the air again, all that is missing went into damping: the law lets go before the ball has left the ground."""
+    """When the ball is in the air again, all missing energy went into damping, because the force vanishes before the
+    ball leaves.
+    """
     ball = rig(MASS, 1.0, DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0))
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
     end = np.array(run.end)
@@ -31,7 +33,7 @@ def test_damping_loss_of_a_bounce_equals_the_lost_height(rtol):
     left = MASS * (EARTH_GRAVITY * end[BODY_HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
     missing = MASS * EARTH_GRAVITY * DROP - left
     assert missing > 0.1
-    # some hundred steps in contact, each to the tolerance
+    # The contact takes about a hundred solver steps, each with an error of the tolerance.
     assert run.dissipated[0] == pytest.approx(missing, abs=max(1e3 * rtol, 1e-11))
 
 
@@ -40,5 +42,5 @@ def test_maximum_penetration_is_found_between_samples():
     feet = sample_feet(scene.walker, walk.samples)
     seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()
     assert seen <= walk.max_penetration_m * (1.0 + 1e-12)
-    # a parabola between samples 20 us apart at a touch of a millisecond
+    # error of a parabola through samples 20 us apart, in a contact of a millisecond
     assert walk.max_penetration_m == pytest.approx(seen, rel=1e-3)

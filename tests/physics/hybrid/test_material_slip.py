@@ -1,4 +1,4 @@
-"""Check that slip is the motion of a foot's material, without the rolling of the ball."""
+"""Check that slip is the motion of the foot's material at the contact, so that rolling does not count."""
 
 from functools import partial
 
@@ -21,13 +21,13 @@ def test_slip_is_the_integral_of_the_material_velocity():
     last = int(np.flatnonzero(stood)[-1])
     slip = np.trapezoid(feet[: last + 1, 1, 4], walk.samples.time_s[: last + 1])
     rolled = -0.001 * (walk.samples.states[last, 3] - walk.samples.states[0, 3])
-    # what a foot that moves at some 0.2 m/s covers from the last sample to its lift
+    # distance that a foot at about 0.2 m/s covers from the last sample to its lift
     assert walk.slip_m[0] == pytest.approx(slip, abs=2e-6)
     assert walk.rolling_m[0] == pytest.approx(rolled, abs=2e-6)
 
 
 def test_round_foot_on_sticky_ground_rolls_and_walks():
-    """It rolls by a quarter of its step, which is no slide."""
+    """It rolls by a quarter of its step, which must not count as a slide."""
     walk = walked(*ROUND, *GLUE, steps=4, start=FIXED_POINT)
     assert walk.outcome is not Outcome.SLID
     assert walk.touch_time_s.size >= 1
@@ -36,7 +36,7 @@ def test_round_foot_on_sticky_ground_rolls_and_walks():
 
 
 def test_pinned_foot_slips_and_rolls_only_after_its_release():
-    """The same foot free slips and rolls by half a millimetre."""
+    """Without the pin, the same foot slips and rolls by half a millimetre."""
     walk = walked("contact.stance=pinned", steps=1)
     assert 0.0 < abs(walk.slip_m[0]) < 1e-6
     assert abs(walk.rolling_m[0]) < 1e-6

@@ -23,7 +23,7 @@ BOUNCING = ("contact.damping=10", "contact.exponent=1.3")
 SWITCHING = ("slope_deg=2.8", "contact.exponent=1.3", "contact.full_damping_penetration=0.26")
 
 
-# of this walker's feet the force law lets go at the instant at which they lift
+# With this walker, the force vanishes at the instant at which a foot lifts.
 LETS_GO = (
     "walker.thigh.length_m=0.31605", "walker.thigh.mass_kg=3.8692", "walker.thigh.mass_below_hip_m=0.20839",
     "walker.thigh.mass_ahead_m=7.6409e-05", "walker.thigh.inertia_kg_m2=0.0020891", "walker.shank.length_m=0.29345",
@@ -35,7 +35,7 @@ LETS_GO = (
 )  # fmt: skip
 
 
-# lightly damped feet that bounce, and how and when their walks end by a plain integration
+# walks with lightly damped feet that bounce, and how and when they end by a plain integration
 STICKING_STRAIGHT = {
     "leg_length_m": 0.54769, "leg_mass_kg": 1.8689, "leg_mass_below_hip_m": 0.27905, "leg_inertia_kg_m2": 0.0056486,
     "hip_mass_kg": 0.0, "foot_radius_m": 0.18666,
@@ -60,7 +60,7 @@ BOUNCING_FEET = {
         ("fell", 0, 0.669021),
     ),
 }  # fmt: skip
-# a foot whose law's force lets go, grips again just below the surface and lifts, on an exponent below two
+# The exponent is below two. The force on a foot vanishes, returns just below the surface, and the foot lifts.
 GRIPS_AGAIN = (
     "walker={type: straight-legs, leg_length_m: 1.0341, leg_mass_kg: 6.7135, leg_mass_below_hip_m: 0.32298, "
     "leg_inertia_kg_m2: 0.017306, hip_mass_kg: 0.0, foot_radius_m: 0.44521}",
@@ -87,7 +87,7 @@ def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE, method="radau5
     ],
     ids=["feet pass as the foot lifts", "stance foot bounces", "law switches as the foot lifts"],
 )
-def test_walk_on_after_mid_swing_ground_agrees_with_the_reference(sets, periods):
+def test_walk_on_ground_that_carries_after_mid_swing_agrees_with_the_reference(sets, periods):
     walk = from_the_gait(*sets, AFTER_MID_SWING, steps=len(periods))
     assert walk.outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.periods_s, periods, atol=6e-7)
@@ -107,12 +107,12 @@ def test_slips_are_equal_on_both_grounds_if_the_law_switches_at_lift():
 
 
 def test_lift_at_the_instant_of_zero_force_is_detected_at_once():
-    """A lift noticed a step later adds what the foot moves meanwhile, up to 0.05 mm."""
+    """If the lift were noticed one solver step later, the slip would include up to 0.05 mm of motion in the air."""
     exact = from_the_gait(*LETS_GO, steps=8, base=Path("kneed"), tolerance=1e-10)
     assert exact.slip_m[[0, 2, 4, 6]] == pytest.approx([1.2121e-3, 1.1332e-3, 1.1529e-3, 1.1495e-3], abs=5e-8)
     for tolerance in (1e-6, 1e-7, 3e-8, 1e-8):
         walk = from_the_gait(*LETS_GO, steps=8, base=Path("kneed"), tolerance=tolerance)
-        # a solver's error of some times the tolerance, at the velocities of some m/s
+        # the solver's error is several times the tolerance, and velocities are a few m/s
         np.testing.assert_allclose(walk.slip_m, exact.slip_m, atol=10.0 * tolerance)
 
 
@@ -125,7 +125,7 @@ def test_bouncing_feet_do_not_stick_at_zero_force(name, method):
         assert (walk.outcome.label, walk.steps) == expected[:2]
         assert walk.end_time_s == pytest.approx(
             expected[2], abs=max(500.0 * tolerance, 1e-6)
-        )  # each bounce magnifies what came before
+        )  # Each bounce magnifies earlier errors.
         assert walk.work.rhs_evaluations < 400_000
 
 
@@ -145,7 +145,7 @@ def test_event_function_rising_from_zero_leaves_the_negative_side_at_once():
 
 
 def test_knee_strike_time_is_the_same_at_any_tolerance():
-    """This holds even if the last part before it, within the step that found it, takes more than one step."""
+    """The solver may need several steps for the last part before the strike."""
     walker = rigid_walker(load(Path("kneed")).config, "corrected")
     start = (*RIGID_ANGLES, *RIGID_RATES)
 

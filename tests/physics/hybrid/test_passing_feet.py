@@ -1,4 +1,4 @@
-"""Check which foot the ground carries after feet have passed each other, in the air, in the ground, or on it."""
+"""Check which foot the ground carries after the feet pass each other in the air, in the ground, or on its surface."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ AIR, GROUND, SURFACE = 0.01, -1e-5, 1e-12  # m, heights of both feet
 
 
 class Feet:
-    """Upright legs side by side at one height, moving up or down with all of the walker."""
+    """Upright legs side by side at one height. They move up or down with the whole walker."""
 
     def __init__(self, terrain, height, rising=True, in_air=None):
         self.scene = scene_of(f"contact.terrain={terrain}")
@@ -44,7 +44,7 @@ class Feet:
 
     @property
     def carried(self):
-        assert self.known.has_ground[STANCE_FOOT] == 1  # however the feet pass, and in the air too
+        assert self.known.has_ground[STANCE_FOOT] == 1  # This holds however the feet pass, even in the air.
         return bool(self.known.has_ground[SWING_FOOT])
 
 

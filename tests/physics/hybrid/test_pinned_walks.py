@@ -1,4 +1,4 @@
-"""Check that a walker pinned at its first stance foot feels the ground under its swing foot like a free one."""
+"""Check that the ground acts on the swing foot of a pinned walker as on that of a free one."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.scene.contact import start_state
 
-MEASURE = 0.5  # m, of steps, and of pads
+MEASURE = 0.5  # m, length by which steps are judged, and pitch of pads
 TERRAINS = {
     "checkerboard": plain_walk.CHECKERBOARD,
     "after-mid-swing": plain_walk.AFTER_MID_SWING,
@@ -20,7 +20,7 @@ TERRAINS = {
 
 
 class Walk(NamedTuple):
-    """A pinned start of the paper's walker on its contact."""
+    """Pinned start of the paper's walker on the paper's ground."""
 
     terrain: str
     slope_deg: float
@@ -37,10 +37,10 @@ class Walk(NamedTuple):
 
 # the rigid gait on 3 degrees, whose swing foot dips into the ground
 SCUFFS_AND_FALLS = Walk("plane", 3.0, 0.2710286, (-0.3773739, -1.0923836))
-# the swing foot starts towards its pad, which pushes it off
+# The swing foot starts moving towards its pad, which pushes it back.
 PUSHED_OFF_ITS_PAD = Walk("checkerboard", 1.0, 0.187, (-0.2, -0.95))
-# equal legs on points pass each other on the ground: the foot comes down there, and goes on below a plane it has not
-# been above ahead of the stance foot
+# Equal legs with point feet pass each other on the ground. The foot comes down there and continues below the plane,
+# because it has not been above it ahead of the stance foot.
 COMES_DOWN_IN_PASSING = Walk("after-mid-swing", 4.0, 0.3332, (-1.0869, -1.6862), radius=0.0)
 
 

@@ -41,7 +41,9 @@ def walked(name, *changes, steps=10):
 
 
 def test_paper_compass_walks_on_level_ground_with_short_pulses_only():
-    """The paper's contact, 4 N s: values of another derivation and code."""
+    """The push-off is 4 N s on the paper's ground. The expected values come from an independent derivation and
+    program.
+    """
     short, _ = walked("level", "push_off.duration_s=0.005")
     assert short.outcome is Outcome.WALKED
     assert short.periods_s[0] == pytest.approx(0.70, abs=0.005)
@@ -85,7 +87,7 @@ def test_derivatives_during_a_pulse_equal_finite_differences(name):
 
 
 def test_push_off_force_acts_from_foot_to_hip_without_moment_about_the_hip():
-    """About the hip, the root's acceleration taken along, the trailing leg feels no torque of it."""
+    """The force passes through the hip, so about the hip it exerts no torque on the trailing leg."""
     _, scene, gait = scene_of("level")
     system = place_on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
@@ -95,7 +97,7 @@ def test_push_off_force_acts_from_foot_to_hip_without_moment_about_the_hip():
     along, upward = foot_wrench(system, 0.0025, trailing, s, c, y, r)
     hip_F = c * form.hip_x[:n] - s * form.hip_y[:n]
     hip_U = s * form.hip_x[:n] + c * form.hip_y[:n]
-    # moving the force to the hip changes the trailing leg's torque by nothing
+    # Moving the force to the hip does not change the torque on the trailing leg.
     assert r[trailing] == pytest.approx(float(-along * hip_U[trailing] + upward * hip_F[trailing]), abs=1e-9)
     assert upward > 0.0
 
@@ -133,7 +135,7 @@ def test_energy_of_a_pushed_walk_balances(name):
 
 
 def at(name, times, *changes, steps=2):
-    """A walk whose samples are at the times."""
+    """Return a walk with samples at these times."""
     _, scene, gait = scene_of(name, *changes)
     start = start_state(scene, gait.state)
     first = scene.walk(start, 1, WALK).touch_time_s[0]
@@ -176,7 +178,7 @@ def test_touch_during_a_pulse_ends_it_and_starts_the_next():
 
 
 def test_short_pulses_converge_to_the_rigid_impulse_as_the_ground_stiffens():
-    """Only then do landing and push-off happen together; a longer pulse finds the leading foot at rest already."""
+    """Landing and push-off coincide only for a short pulse. During a longer one the leading foot comes to rest."""
     law, off = load(Path("level")).config.contact, {}
     for factor, durations in ((1.0, (1e-6,)), (100.0, (1e-3, 1e-4, 3e-5))):
         changed = {
@@ -211,9 +213,11 @@ def test_pulse_lasting_beyond_mid_swing_has_no_gait():
 
 
 def test_bounce_of_the_leading_foot_starts_no_second_pulse():
-    """Ground that hardly damps throws that foot up again; the pulse goes on as the first touch began it.
+    """Ground with little damping throws the leading foot up again, but the pulse continues as it began at the first
+    touch.
 
-    So it does under a trailing foot that has left the ground: its work is that of the stated force on its way.
+    The pulse also continues after the trailing foot has left the ground: its work is that of the stated force along the
+    way.
     """
     bouncing = ("contact.damping=0.2", "contact.terrain=after-mid-swing", "push_off.duration_s=0.05")
     _, scene, gait = scene_of("level", *bouncing, "push_off.impulse_N_s=1")

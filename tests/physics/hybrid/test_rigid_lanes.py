@@ -1,4 +1,4 @@
-"""Check that walks in lanes have the same ends, steps and heel strikes as one by one at a tight tolerance."""
+"""Check that walks in lanes have the same ends, steps and heel strikes as single walks at a tight tolerance."""
 
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ STEPS = 10
 ONE_DEGREE = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, np.deg2rad(1.0), CORRECTED)
 STEEP = ONE_DEGREE._replace(slope=np.deg2rad(5.3))
 SMALL = RigidWalker(0.01, 0.004, 1e-3, 3e-3, 1e-9, 1.6, 0.02, CORRECTED)
-# ten steps from x_p at one degree, agreed by two tools
+# state after ten steps from x_p at one degree, on which two tools agree
 START, TENTH_STATE = (
     (0.1674, -0.60, -0.84),
     (-0.204388204282412, 0.169481619242526, -0.606147299375954, -0.861660164829674),
@@ -25,7 +25,7 @@ TENTH_TIME = 7.025036761059791
 
 
 class Strikes(NamedTuple):
-    """An observer that keeps every heel strike; a walk is over when there is no more room."""
+    """Observer that keeps every heel strike, and ends a walk when there is no room for more."""
 
     times: Any  # (n, steps) s
     after: Any  # (n, steps, 4) states just after them
@@ -72,18 +72,18 @@ def test_ten_steps_end_at_the_reference_state(rtol, error):
 @pytest.mark.parametrize("walker", [ONE_DEGREE, STEEP, SMALL], ids=["paper", "steep", "small"])
 def test_random_starts_end_the_same_way_in_lanes_as_in_single_walks(walker):
     starts = random_starts(walker, 200)
-    fates, strikes = in_lanes(walker, starts, 1e-11)  # on the steep slope errors grow with every step
+    fates, strikes = in_lanes(walker, starts, 1e-11)  # On the steep slope errors grow with every step.
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
     time = np.sqrt(walker.leg_length / walker.gravity)
     for i, start in enumerate(starts.tolist()):
         walk = take_walk(assembled(walker), tolerances, tuple(start), STEPS)
-        walked = walk.steps == STEPS  # a ground that would have to pull does not end a rigid walk
+        walked = walk.steps == STEPS  # A rigid walk does not end if the ground would have to pull.
         assert (fates.outcome[i], fates.steps[i]) == (0 if walked else walk.outcome, walk.steps)
         assert strikes.times[i, : walk.steps] == pytest.approx(walk.touch_time_s, abs=1e-6 * time)
     assert {Outcome.FELL, Outcome.REJECTED} <= set(fates.outcome.tolist())
 
 
-def test_starts_near_a_gait_walk_equally_in_lanes_and_in_single_walks():
+def test_starts_near_a_gait_give_the_same_walks_in_lanes_and_one_by_one():
     generator = np.random.default_rng(3)
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
@@ -115,7 +115,7 @@ def test_overflow_ends_the_walk():
     assert Outcome(int(fates.outcome[0])) in (Outcome.SOLVER_FAILED, Outcome.BUDGET_EXHAUSTED)
 
 
-def test_driven_walks_are_equal_in_lanes_and_in_single_walks():
+def test_driven_walks_in_lanes_equal_single_walks():
     driven = assembled(ONE_DEGREE).changed(hip=(5.0, 0.1, 0.5), push_off=1.0)
     starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
     fates, strikes = model_in_lanes(driven, starts, 1e-10)

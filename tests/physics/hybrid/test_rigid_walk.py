@@ -1,4 +1,4 @@
-"""Compare rigid walks with a reference on which two tools agree, and with SciPy, which has events of its own."""
+"""Compare rigid walks with a reference on which two tools agree, and with SciPy's integration and event finder."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def walked(walker, start, steps, rtol=1e-10, method="dop853", **options):
     return take_walk(walker, Tolerances(method, rtol, 1e-2 * rtol, 10**6), start, steps, **options)
 
 
-# ten steps from x_p at one degree: two tools agree on these to 1e-36
+# state after ten steps from x_p at one degree, on which two tools agree to 1e-36
 TENTH_STATE = (-0.204388204282412, 0.169481619242526, -0.606147299375954, -0.861660164829674)
 TENTH_TIME = 7.025036761059791
 
@@ -66,7 +66,7 @@ def test_scipy_method_reaches_the_same_state_after_three_steps(name):
 
 
 def swing_by_scipy(walker, start, feet):
-    """The swing until the event function of the feet ends it, by SciPy's DOP853."""
+    """Integrate a swing by SciPy's DOP853 until the event function of the feet ends it."""
     return solve_ivp(
         lambda t, y: [y[2], y[3], *accelerations(walker, *y)],
         (0.0, 3.0),
@@ -81,7 +81,7 @@ def swing_by_scipy(walker, start, feet):
 
 
 def one_step_by_scipy(walker, start):
-    """Heel strike by SciPy's event finder: both feet on the slope, well after mid-swing."""
+    """Find the heel strike with SciPy's event finder: both feet are on the slope, well after mid-swing."""
 
     def feet(t, y):
         return y[0] + y[1] + 2 * walker.slope if y[0] > y[1] + 0.05 else 1.0
@@ -104,7 +104,7 @@ def test_step_agrees_with_scipy(walker):
 
 
 def test_mirrored_walker_walks_down_to_the_left():
-    # the mirror image of a step, found by SciPy with the mirrored guard
+    # Mirror image of a step, which SciPy finds with the mirrored guard.
     walker = ONE_DEGREE._replace(slope=-ONE_DEGREE.slope)
 
     def feet(t, y):
@@ -132,7 +132,7 @@ def test_mean_energy_is_the_time_average_of_the_samples():
     walk = walked(PAPER._replace(c21_sign=AS_PRINTED), start_of(PAPER), 4, 1e-10, sampled=True)
     energy = energies(PAPER, walk.samples.state).sum(axis=1)
     mean = np.trapezoid(energy, walk.samples.time_s) / walk.samples.time_s[-1]
-    # the trapezoidal rule's own error at 64 samples a unit of time
+    # error of the trapezoidal rule at 64 samples a unit of time
     assert walk.mean_energy == pytest.approx(mean, rel=1e-6)
 
 
@@ -146,11 +146,13 @@ def test_extremes_agree_with_the_samples():
 
 
 def test_extremes_do_not_depend_on_the_solver_step():
-    """They are taken inside the integration's steps; at samples alone they lie up to a thousandth low."""
+    """They are computed inside the solver steps. The maximum over samples alone would be too low by up to a
+    thousandth.
+    """
     long, short = (walked(ONE_DEGREE, GAIT, 2, rtol=rtol) for rtol in (1e-8, 1e-13))
     assert long.work.accepted < 0.5 * short.work.accepted
     for name in ("max_scuff_depth", "min_normal_force", "max_friction_ratio"):
-        # the states of the looser walk are off by some times its tolerance, extremes by no more
+        # States of the looser walk are off by several times its tolerance, and extremes by no more.
         assert getattr(long, name) == pytest.approx(getattr(short, name), rel=2e-6), name
 
 
@@ -207,7 +209,7 @@ def test_slow_walker_falls():
     assert walk.outcome is Outcome.FELL
     assert walk.steps == 0
     assert walk.final_state == walk.start
-    # samples end with the fall: the hip at half a leg
+    # The last sample is at the fall, where the hip height is half a leg.
     assert np.cos(walk.samples.state[-1, 1] + PAPER.slope) == pytest.approx(0.5, abs=0.03)
 
 
@@ -227,7 +229,7 @@ def test_walk_that_needs_a_pulling_ground_is_reported_as_lifting_off():
 
 
 def test_standing_with_legs_together_is_not_a_heel_strike():
-    # both legs hang straight down from a hip that stands exactly on top
+    # Both legs are vertical, with the hip exactly above the feet.
     walker = PAPER._replace(slope=0.0)
     walk = walked(walker, (0.0, 0.0, 0.0, 0.0), 2)
     assert walk.outcome is Outcome.NO_HEEL_STRIKE

@@ -67,7 +67,7 @@ FEET_TOGETHER = (
 
 
 def test_backward_landing_counts_as_a_fall():
-    """The foot comes down 2 mm ahead of the other, which has rolled back by 8 mm."""
+    """The foot lands 2 mm ahead of the other foot, which has rolled back by 8 mm."""
     walker = rigid_walker(load(Path("rigid-only"), ROUND_FEET_UPHILL).config)
     heights = np.array([0.0, 0.403e-3, 0.907e-3])
     plain, _, ahead = plain_walk(walker, np.array(FEET_TOGETHER), heights[:2])
@@ -101,7 +101,7 @@ def test_tangents_over_uneven_steps_equal_finite_differences(name):
     _, walker, gait = gait_of(name)
     shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
     z, d = coordinates_of(walker, gait.state), int(walker.coordinates)
-    rises = np.array([0.0, 6e-4, -9e-4, 3e-4]) * walker.leg_length  # the last foothold is level with the first
+    rises = np.array([0.0, 6e-4, -9e-4, 3e-4]) * walker.leg_length  # The last foothold is at the height of the first.
 
     def end(z, derived=False):
         return shooting.walk(section, z, 3, derived, (rises, 0.0))
@@ -116,7 +116,7 @@ def test_tangents_over_uneven_steps_equal_finite_differences(name):
 
 
 def test_work_of_gravity_on_uneven_ground_includes_height_changes():
-    """The cost of transport includes them as well: what the walker descends is spent."""
+    """The cost of transport includes them as well, because descending spends energy."""
     _, walker, gait = gait_of("paper")
     weight = walker.mass * walker.gravity
     for height in (-5e-4, 5e-4):
@@ -189,7 +189,7 @@ def test_contact_walk_over_heights_of_zero_equals_even_ground_bit_for_bit(case):
 
 
 def test_stiffer_uneven_ground_brings_the_contact_walk_closer_to_the_rigid_one():
-    """The series to the limit is that of `tune`: stiffness, damping as its root, and slower creep."""
+    """The series is that of `tune`: the stiffness grows, damping grows as its root, and creep slows down."""
     config, walker, gait = gait_of("slope-3deg")
     heights, law = np.array([0.0, -2e-3, 1e-3, -1e-3, -1e-3]), config.contact
     rigid = take_walk(walker, TIGHT, gait.state, 3, heights=heights[:-1])
@@ -219,13 +219,16 @@ def test_hitting_the_side_of_a_raised_pad_is_off_pad():
 
 
 def test_foot_is_supported_after_mid_swing_once_it_was_above_its_foothold():
-    """A foothold so deep that the foot never comes down onto it in time, and one that it is never above: both fall."""
+    """The walker falls if a foothold is too deep to be reached in time, and if it is so high that the foot is never
+    above it.
+    """
     for height in (0.3, -0.4):
         _, walk = on_terrain("slope-3deg", "after-mid-swing", np.array([0.0, 0.0, height]))
         assert (walk.outcome, walk.steps) == (Outcome.FELL, 1)
 
 
-# ---- feet that pass again, and a foot that the ground lets go late ---------------------------------------------------
+# ---- feet that pass again, and a foot that the ground releases late
+# ---------------------------------------------------
 
 SLIDES_BACK = (
     "walker.leg_length_m=0.54348",
@@ -304,7 +307,7 @@ def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
 
 @pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
 def test_foot_in_the_ground_at_a_second_passing_is_supported_as_on_even_ground(terrain):
-    """Only a foothold that is never reached is not level."""
+    """All footholds are level but one, which is never reached."""
     sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
     heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
     even, uneven = (walk_from(sets, SLIDES_BACK_FROM, 3, each) for each in (None, heights))
@@ -338,7 +341,7 @@ def test_last_listed_height_repeats_and_random_heights_do_not_depend_on_their_co
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
 def test_fall_is_judged_by_the_hip_height_above_the_foothold(leg):
-    """The walker walks down stairs by a leg's length: only the ground falls."""
+    """The walker descends stairs by a leg length in all, so only the ground gets lower."""
     _, walker, gait = gait_of("slope-3deg")
     heights = np.append(0.0, -1e-3 * np.arange(1, 701)) if leg == SWING else np.append(0.0, 1e-4 * np.arange(1, 701))
     walk = take_walk(walker, Tolerances("dop853", 1e-9, 1e-11, 10**8), gait.state, 700, heights=heights)

@@ -5,8 +5,8 @@ import sympy as sp
 from walkerlab.physics.mechanics.parts import Anchor, Assembly, BallFoot, Body, Particle, Revolute
 
 RADIUS = 0.02
-# stance leg from its foot point up, torso from the hip up, thigh from the hip down, shank from the knee down; every
-# centre of mass is off its body's axis
+# The stance leg extends upwards from its foot point, the torso upwards from the hip, the thigh down from the hip, and
+# the shank down from the knee. Every centre of mass is off the axis of its body.
 BODIES = (
     Body("stance", 4.0, (0.03, 0.55), 0.20),
     Body("torso", 12.0, (0.05, 0.35), 0.60),
@@ -15,7 +15,7 @@ BODIES = (
 )
 KNEED = Assembly(
     bodies=BODIES,
-    # hinges listed against the order of the chain, and with parents on either side
+    # Hinges are not in the order of the chain, and parents are on either side.
     joints=(
         Revolute("knee", "shank", (0.0, 0.0), "thigh", (0.0, -0.45)),
         Revolute("hip of the swing leg", "stance", (0.0, 0.98), "thigh", (0.0, 0.0)),
@@ -42,7 +42,7 @@ def turned(angle, across, up):
 
 
 def mass_points():
-    """(mass, position) of everything, from the stance foot's point (x, y) upwards."""
+    """Return (mass, position) of all masses, beginning at the point (x, y) of the stance foot."""
     stance, torso, thigh, shank = theta
     foot = sp.Matrix([x, y])
     hip = foot + turned(stance, 0, 0.98)
@@ -57,7 +57,7 @@ def mass_points():
 
 
 def energies():
-    """Kinetic and potential energy."""
+    """Return kinetic and potential energy."""
     inertias = (0.20, 0.60, 0.04, 0.02)
     kinetic = sum((J * w**2 for J, w in zip(inertias, omega, strict=True)), sp.Integer(0)) / 2
     potential = sp.Integer(0)
@@ -69,7 +69,7 @@ def energies():
 
 
 def lagrange_equations():
-    """Compiled (M, bias, weight) of Lagrange's equations."""
+    """Return (M, bias, weight) of Lagrange's equations as compiled functions."""
     kinetic, potential = energies()
     momentum = sp.Matrix([kinetic.diff(rate) for rate in dq])
     M = momentum.jacobian(dq)

@@ -17,8 +17,8 @@ from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.mechanics.parts import Anchor
 
-ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
-STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)
+ROUNDING = 1e-12  # a few dozen rounding errors of the size of the largest entry
+STANCE = 1  # index of the stance leg: leg 1 swings, leg 2 stands
 LAW = Impact(1e5, 1.5, 1e3, 1e-4)
 
 angle = st.floats(-3.0, 3.0)
@@ -44,7 +44,7 @@ def point_of_stance_foot(parts):
 
 
 def printed_released(parts, theta_1, theta_2, w_1, w_2, g):
-    """(A.8) to (A.40), with the sign of (A.29) corrected."""
+    """Return the terms of (A.8) to (A.40), with the sign of (A.29) corrected."""
     L, a, m, M_H = parts.leg_length_m, parts.foot_to_mass_m, parts.leg_mass_kg, parts.hip_mass_kg
     b, K = L - a, L * m + a * m + L * M_H
     s_1, c_1, s_2, c_2 = math.sin(theta_1), math.cos(theta_1), math.sin(theta_2), math.cos(theta_2)
@@ -53,7 +53,7 @@ def printed_released(parts, theta_1, theta_2, w_1, w_2, g):
     C = np.array(
         [
             [0.0, -m * L * b * w_2 * sin_12, 0.0, 0.0],
-            [+m * L * b * w_1 * sin_12, 0.0, 0.0, 0.0],  # printed: minus
+            [+m * L * b * w_1 * sin_12, 0.0, 0.0, 0.0],  # The paper prints a minus here.
             [-b * w_1 * m * s_1, w_2 * s_2 * K, 0.0, 0.0],
             [b * w_1 * m * c_1, -w_2 * c_2 * K, 0.0, 0.0],
         ]
@@ -63,7 +63,7 @@ def printed_released(parts, theta_1, theta_2, w_1, w_2, g):
 
 
 def printed_swing(parts, theta_1, theta_2, w_1, w_2, g):
-    """(A.4) to (A.6), with the sign of C_21 in (A.5) corrected."""
+    """Return the terms of (A.4) to (A.6), with the sign of C_21 in (A.5) corrected."""
     L, a, m, M_H = parts.leg_length_m, parts.foot_to_mass_m, parts.leg_mass_kg, parts.hip_mass_kg
     b, d = L - a, theta_2 - theta_1
     coupling = -m * L * b * math.cos(d)
@@ -97,14 +97,16 @@ def test_pinned_compass_equals_the_swing_phase_of_appendix_a(parts, state):
     pinned = place_on_ground(walker_of(parts, 0.0, g), (False, False), pinned=True)
     D, bias, G = printed_swing(parts, *state, g)
     found = np.array(rate_of(pinned, state)[2:])
-    # the residual of D ddq + C dq + G = 0, free of the matrix' condition
+    # The residual of D ddq + C dq + G = 0 does not depend on the condition of the matrix.
     size = np.abs(D).max() * np.abs(found).max() + np.abs(bias).max() + np.abs(G).max()
     close(D @ found, -bias - G, scale=10.0 * size)
 
 
 @given(parts=compasses(), state=states, slope=st.floats(-0.5, 0.5))
 def test_slope_only_rotates_the_frame(parts, state, slope):
-    """Absolute angles: the swing phase does not know the slope; the floating base knows it by its axes alone."""
+    """Angles are absolute, so the slope does not enter the swing phase, and enters the floating base only through its
+    axes.
+    """
     level, tilted = walker_of(parts, 0.0, 9.81), walker_of(parts, slope, 9.81)
     pinned = [rate_of(place_on_ground(w, (False, False), pinned=True), state) for w in (level, tilted)]
     close(pinned[1], pinned[0], scale=1e3 * (1.0 + np.abs(pinned[0]).max()))
@@ -117,7 +119,7 @@ def test_slope_only_rotates_the_frame(parts, state, slope):
 @settings(max_examples=50)
 @given(state=states)
 def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
-    """The integrated equations leave out the centre of mass. The full matrices about the foot do not."""
+    """The integrated equations eliminate the centre of mass. The full matrices about the foot do not."""
     parts = CompassParts(1.0, 0.4, 5.0, 10.0, inertia, 0.0)
     assembly = compass_assembly(parts)
     full = mass_matrix_and_bias(assembly, point_of_stance_foot(parts), state[:2], state[2:], 9.81)

@@ -33,7 +33,9 @@ def lagrange():
 
 @pytest.fixture(scope="module")
 def measured():
-    """Centre of mass, momentum, angular momentum about the centre and energies of a state about the foot's point."""
+    """Return centre of mass, momentum, angular momentum about the centre, and energies of a state given at the foot's
+    point.
+    """
     points = kneed.mass_points()
     mass = sum(m for m, _ in points)
     velocities = [place.jacobian(kneed.q) * kneed.dq for _, place in points]
@@ -55,7 +57,7 @@ def flying_walker(slope=0.0):
 
 
 def flight(theta, omega, velocity, duration):
-    """States of the free walker along a flight, (samples, 12)."""
+    """Return states (samples, 12) of the free walker along a flight."""
     system = place_on_ground(flying_walker(), IN_THE_AIR)
     start = np.array([0.0, 5.0, *theta, *velocity, *omega])
     path = solve_ivp(lambda _, y: rate_of(system, y), (0.0, duration), start, method="DOP853", rtol=1e-12, atol=1e-13)
@@ -74,7 +76,7 @@ def test_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, om
 
 @given(theta=angles, omega=rates)
 def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, omega):
-    """The hinge is at the ball's centre: the foot point's rows drop out once its matrix is moved there."""
+    """The hinge is at the centre of the ball. Once the matrix is moved there, the rows of the foot point drop out."""
     pinned = place_on_ground(flying_walker(slope=0.1), IN_THE_AIR, pinned=True)
     at_hinge = Anchor("stance", (0.0, 0.02))
     alpha = np.array(rate_of(pinned, (*theta, *omega))[4:])
@@ -82,7 +84,7 @@ def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, th
     residual = full.mass_matrix[:4, :4] @ alpha + full.bias[:4] + full.weight[:4]
     size = np.abs(full.mass_matrix).max() * np.abs(alpha).max() + np.abs(full.weight).max()
     assert np.abs(residual).max() <= 1e-12 * size
-    # moving the root by R(theta_stance) (0, 0.02) changes coordinates: M_hinge = B' M_foot B
+    # The root moves by R(theta_stance) (0, 0.02), which is a change of coordinates: M_hinge = B' M_foot B.
     M, _, _ = lagrange(theta, omega, (0.0, 0.0), GRAVITY)
     B = np.eye(6)
     B[4, 0], B[5, 0] = 0.02 * np.cos(theta[0]), 0.02 * np.sin(theta[0])
@@ -141,7 +143,7 @@ def test_energy_and_angular_momentum_are_constant_in_flight(measured, theta, ome
 
 @given(theta=angles)
 def test_levers_lead_from_any_root_to_any_point(theta):
-    """root + sum of R(theta_k) d_k is the point, whichever way the chain is walked."""
+    """A point is root + sum of R(theta_k) d_k, from whichever end of the chain the sum starts."""
     s, c = np.sin(theta), np.cos(theta)
     foot, head, toe = kneed.STANCE_POINT, Anchor("torso", (0.1, 0.7)), Anchor("shank", (0.0, -0.48))
 
@@ -180,7 +182,9 @@ def test_root_on_an_unknown_body_is_rejected():
 
 
 def test_closed_loop_is_rejected():
-    """A tree has one hinge fewer than bodies: a loop's second way round would be ignored in silence."""
+    """A tree has one hinge fewer than bodies. Without the check, the hinge that closes a loop would be ignored
+    silently.
+    """
     bodies = tuple(Body(name, 1.0, (0.0, 0.0)) for name in ("a", "b", "c"))
     loop = tuple(
         Revolute(f"{one}{other}", one, (1.0, 0.0), other, (0.0, 0.0))

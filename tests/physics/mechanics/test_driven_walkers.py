@@ -37,7 +37,7 @@ hips = st.builds(
 
 
 def driven(test):
-    """Run the test for random walkers of one type at a time, on slopes either way, with random drives and states."""
+    """Run the test for random walkers of one type at a time, uphill and downhill, with random drives and states."""
 
     @each_type
     @settings(max_examples=EXAMPLES)
@@ -79,7 +79,9 @@ def test_energy_change_of_a_swing_equals_the_work_of_torque_and_damper(assembly,
 
 @driven
 def test_hip_torques_act_on_both_legs_and_nothing_else(assembly, model, free):
-    """Angular momentum about the foothold changes as gravity has it; a push forward swings the free leg forward."""
+    """Only gravity changes the angular momentum about the foothold, and a positive torque swings the free leg
+    forward.
+    """
     passive = model.changed(hip=0.0)
     y, n = state_of(model, BENT, free), len(model.arm_x)
     h, rate_of = 1e-6, []
@@ -143,11 +145,14 @@ def test_push_off_acts_along_the_line_from_trailing_contact_to_hip(assembly, mod
 
 @driven
 def test_push_off_acts_on_the_free_walker_just_before_the_strike(assembly, model, free):
-    """Mass by mass: what an impulse at the trailing contact point changes, with the knees locked and the torso held."""
+    """Compute for each mass what an impulse at the trailing contact point changes, with locked knees and a held
+    torso.
+    """
     y, n = np.array(both_feet_down(model, free)), len(model.arm_x)
     Z = model.E[STRAIGHT][:, np.diag(model.E[STRAIGHT]) != 0.0]
     rest = np.concatenate((y[:n], np.zeros(n)))
-    moves = [np.concatenate((y[:n], column)) for column in Z.T]  # angular velocities, then the foot centre's two
+    # angular velocities, then the two velocities of the foot centre
+    moves = [np.concatenate((y[:n], column)) for column in Z.T]
 
     def velocities(k):
         points, spins, _ = in_motion(assembly, model, moves[k] if k < len(moves) else rest, np.zeros(2))
@@ -164,7 +169,7 @@ def test_push_off_acts_on_the_free_walker_just_before_the_strike(assembly, model
     turned = np.array([[np.cos(psi), -np.sin(psi)], [np.sin(psi), np.cos(psi)]])
     to_hip = turned @ (model.hip_x, model.hip_y) + (0.0, model.radius)
     e = to_hip / np.linalg.norm(to_hip)
-    # the contact point lies a radius below the foot's centre
+    # The contact point is one radius below the centre of the foot.
     J = np.array([*(model.radius * move[n + STANCE] * e[0] for move in moves), *e])
     work = 0.5 * model.push_off**2 * J @ np.linalg.solve(M, J)
     (found,) = impact.push_off_work(model, y[None])

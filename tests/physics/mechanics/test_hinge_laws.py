@@ -1,4 +1,4 @@
-"""Hinge laws derived from SpringDamper: a cubic spring with quadratic damping, uncompiled."""
+"""Tests of hinge laws derived from SpringDamper, on a cubic spring with quadratic damping that is not compiled."""
 
 import numba
 import numpy as np
@@ -19,7 +19,7 @@ PARTS = compass_assembly(CompassParts(0.8, 0.35, 2.0, 5.0, 0.02, 0.01))
 
 
 class Cubic(SpringDamper):
-    """Torque -k a^3 - c a' |a'|."""
+    """Hinge law with the torque -k a^3 - c a' |a'|."""
 
     @classmethod
     def units(cls, energy, time):

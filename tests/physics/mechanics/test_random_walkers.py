@@ -98,13 +98,15 @@ def state_of(model, phase, free):
 
 
 def both_feet_down(model, free):
-    """A state at heel strike: straight legs, both feet on the slope."""
+    """Return a state at heel strike, with straight legs and both feet on the slope."""
     swing = -2.0 * (model.slope + model.lean) - free[0]
     return state_of(model, STRAIGHT, (swing, free[0], swing, *free[3:]))
 
 
 def in_motion(assembly, model, y, centre):
-    """(mass, place, velocity), (inertia, spin) and the swing foot's centre, from the stance foot's centre upwards."""
+    """Return (mass, position, velocity) and (inertia, angular velocity) of all parts, and the swing foot's centre,
+    measured from the stance foot's centre.
+    """
     n = len(y) // 2
     place_of = dict.fromkeys(assembly.legs[0], 0) | dict.fromkeys(assembly.legs[1], STANCE)
     if len(assembly.legs[0]) > 1:
@@ -179,7 +181,7 @@ def test_heel_strike_conserves_angular_momentum_and_gains_no_energy(assembly, sl
     after = heel_strike(model, y)
     points, spins, foot = in_motion(assembly, model, y, np.zeros(2))
     new_points, new_spins, trailing = in_motion(assembly, model, after, foot)
-    assert trailing == pytest.approx(np.zeros(2), abs=1e-12)  # the foot that stood is where it was
+    assert trailing == pytest.approx(np.zeros(2), abs=1e-12)  # The foot that stood has not moved.
     contact = foot - (0.0, model.radius)
     scale = 1.0 + energy_of(points, spins)
     assert angular_momentum(new_points, new_spins, contact) == pytest.approx(
@@ -203,7 +205,7 @@ def test_knee_strike_conserves_angular_momentum_and_gains_no_energy(walker, slop
 
 
 def mapped(assembly: Assembly, place, of_mass=lambda m: m, of_inertia=lambda i: i, of_radius=lambda r: r) -> Assembly:
-    """The assembly with every point (of a body) moved, and its masses, inertias and radii changed."""
+    """Return the assembly with every point mapped by `place`, and with masses, inertias and radii changed."""
     return replace(
         assembly,
         bodies=tuple(
@@ -277,7 +279,7 @@ def test_scaled_copy_of_a_walker_takes_the_same_steps(assembly, slope, free):
 
 
 def by_parts(assembly, radius_m, leg_length_m):
-    """The assembly as a config of type `parts` lists it."""
+    """Return the assembly in the form of a config of type `parts`."""
     locking = {(knee.thigh, knee.shank) for knee in assembly.knees}
     return PartsWalker(
         type="parts",
@@ -297,7 +299,7 @@ def by_parts(assembly, radius_m, leg_length_m):
 @for_each_type
 def test_walker_built_from_parts_equals_that_of_its_type(assembly, slope, free):
     model = rigid_on_slope(assembly, G, slope)
-    # one and the same shift for like bodies of both legs
+    # Equal bodies of both legs are shifted equally.
     shifts = dict(
         zip(("leg", "thigh", "shank", "torso"), ((0.1, 0.3), (-0.2, 0.1), (0.3, -0.4), (0.0, 0.5)), strict=True)
     )

@@ -44,7 +44,7 @@ ON_STRAIGHT_LEGS = rigid_on_slope(straight_legs(LEG, HIP, Arc(RADIUS, AHEAD)), G
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 
 angle, rate = st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)
-free = st.tuples(angle, angle, angle, rate, rate, rate)  # swing thigh, stance leg, swing shank
+free = st.tuples(angle, angle, angle, rate, rate, rate)  # of swing thigh, stance leg and swing shank
 
 
 def turned(psi, across, up):
@@ -52,7 +52,9 @@ def turned(psi, across, up):
 
 
 def kneed_points(thigh, stance, shank, centre):
-    """(mass, inertia, angle, position) of everything in the slope's frame, upwards from the stance foot's centre."""
+    """Return (mass, inertia, angle, position) of all parts in the slope's frame, measured from the stance foot's
+    centre.
+    """
     hip = centre - turned(stance, AHEAD, RADIUS - THIGH.length_m - SHANK.length_m)
     stance_knee = hip + turned(stance, 0, -THIGH.length_m)
     knee = hip + turned(thigh, 0, -THIGH.length_m)
@@ -70,7 +72,9 @@ def kneed_points(thigh, stance, shank, centre):
 
 @pytest.fixture(scope="module")
 def lagrange():
-    """Compiled: accelerations of (thigh, stance, shank), kinetic energy, momentum's rate less gravity along and up."""
+    """Return compiled functions: accelerations of (thigh, stance, shank), kinetic energy, and the momentum rate minus
+    gravity along and normal to the slope.
+    """
     q, dq, ddq = sp.symbols("q:3"), sp.symbols("dq:3"), sp.symbols("ddq:3")
     points = kneed_points(q[0], q[1], q[2], sp.Matrix([-RADIUS * q[1], RADIUS]))
 
@@ -118,7 +122,7 @@ def test_rolling_kneed_walker_with_torso_obeys_lagrange_equations(lagrange, numb
 
 @given(free)
 def test_straight_leg_moves_as_one_body(lagrange, numbers):
-    """Lagrange's equations with thigh and shank held together: their sum, for one angle."""
+    """With thigh and shank held together, Lagrange's equations of both add up to one equation for one angle."""
     thigh, stance, _, d_thigh, d_stance, _ = numbers
     y = kneed_state((thigh, stance, thigh, d_thigh, d_stance, d_thigh))
     M, rest, _, _ = lagrange[0](np.array([thigh, stance, thigh]) + SLOPE, (d_thigh, d_stance, d_thigh))
@@ -138,7 +142,7 @@ def test_assembled_compass_swings_as_in_appendix_a(y, sign):
 
 
 def masses_of(model, y, new):
-    """(mass, position, velocity) and (inertia, rate) of the kneed walker with straight legs: from mass positions.
+    """Return (mass, position, velocity) and (inertia, rate) of all parts of the kneed walker with straight legs.
 
     new  whether it stands on the foot that has just come down
     """
@@ -172,8 +176,8 @@ def angular_momentum(parts, spins, about):
 
 @given(st.tuples(angle, rate, rate))
 def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
-    """These are the whole walker's about the new contact point, and the trailing leg's with half of the torso's about
-    the hip.
+    """Conserved are the angular momentum of the whole walker about the new contact point, and that of the trailing leg
+    plus half of the torso's about the hip.
     """
     stance, d_stance, d_thigh = numbers
     thigh = -2.0 * (SLOPE + KNEED.lean) - stance
@@ -184,7 +188,8 @@ def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
     contact, new_contact = foot - [0.0, RADIUS], np.array([0.0, 0.0])
     before = angular_momentum(old, old_spins, contact)
     assert angular_momentum(new, new_spins, new_contact) == pytest.approx(before, rel=1e-9, abs=1e-9)
-    # trailing leg: old stance, parts 1 and 2; after the strike the swing leg, parts 3 and 4; the torso comes last
+    # The trailing leg has parts 1 and 2 before the strike, as stance leg, and parts 3 and 4 after it, as swing leg. The
+    # torso comes last.
     trailing = angular_momentum(old[1:3], old_spins[:1], hip) + 0.5 * angular_momentum(old[5:], old_spins[2:], hip)
     left = angular_momentum(new[3:5], new_spins[1:2], new_hip) + 0.5 * angular_momentum(new[5:], new_spins[2:], new_hip)
     assert left == pytest.approx(trailing, rel=1e-9, abs=1e-9)
@@ -194,7 +199,9 @@ def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
 
 @given(free)
 def test_knee_strike_conserves_the_other_momenta_and_loses_energy(numbers):
-    """Generalised momenta of the stance leg, and of thigh and shank together, are those of Lagrange's equations."""
+    """Conserved are the generalised momenta of Lagrange's equations for the stance leg, and for thigh and shank
+    together.
+    """
     thigh, stance, _, *speeds = numbers
     y = kneed_state((thigh, stance, thigh, *speeds))
     after = knee_strike(KNEED, y)
@@ -243,7 +250,7 @@ def test_tangent_columns_obey_the_linearised_equations(phase, numbers):
 
 @given(numbers=free)
 def test_locked_leg_moves_like_a_leg_of_one_piece(numbers):
-    """Thigh and shank as one limb, by the parallel axes of their masses."""
+    """The inertia of the leg of one piece follows from the parallel axis theorem."""
     mass, below = THIGH.mass_kg + SHANK.mass_kg, THIGH.length_m + SHANK.mass_below_m
     ahead = (THIGH.mass_kg * THIGH.mass_ahead_m + SHANK.mass_kg * SHANK.mass_ahead_m) / mass
     down = (THIGH.mass_kg * THIGH.mass_below_m + SHANK.mass_kg * below) / mass
@@ -283,7 +290,7 @@ def test_both_feet_touch_if_the_legs_lean_symmetrically(leg):
     (1, lambda e: add_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), e, 0.3, 0.0)),
 ])  # fmt: skip
 def test_walker_with_vanishing_foot_radius_and_torso_equals_the_compass(order, walker):
-    """Radius and torso mass: the rates of the legs come back linearly."""
+    """As radius and torso mass vanish, the rates of the legs approach those of the compass linearly."""
     y = (0.2, -0.1, -0.8, -1.1)
     compass = rigid_on_slope(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
     wanted = np.array(rates(compass, BENT, y))
@@ -310,7 +317,7 @@ def compiled_strikes(model, y, heel, knee):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 def test_compiled_code_reads_no_uninitialised_memory(phase):
-    """In Python unwritten scratch is NaN, and compiled code gives the same results."""
+    """In Python, scratch memory begins as NaN, so equal results show that compiled code reads none of it."""
     y = np.random.default_rng(1).uniform(-0.5, 0.5, 24)
     results = []
     for rate, strikes in ((compiled, compiled_strikes), (uncompiled(compiled), uncompiled(compiled_strikes))):

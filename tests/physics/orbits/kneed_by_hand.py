@@ -1,7 +1,7 @@
-"""A step of a kneed walker whose torso bisects its legs, by Lagrange's equations and SciPy alone.
+"""Simulate a step of a kneed walker whose torso bisects the legs, with nothing but Lagrange's equations and SciPy.
 
-Masses sit at sums of arms times exp(i theta) in the complex plane, from the stance foot; feet are points, perhaps ahead
-of the shank's line. Bodies: swing
+The position of a mass, measured from the stance foot, is a sum of arms times exp(i theta) in the complex plane. Feet
+are points, which may lie ahead of the line of the shank. Bodies: swing
 thigh, stance leg, swing shank and torso. Section: stance angle, rates of swing and stance leg just after heel strike.
 """
 
@@ -10,14 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-BENT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]])  # rates of bodies by free ones
+# maps the free rates to the rates of the bodies
+BENT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]])
 STRAIGHT = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]])
-ARMED_S = 0.01  # after its release a knee cannot strike for so long
+ARMED_S = 0.01  # s; a knee cannot strike within this time after its release
 FIRST_STEP_S = 1e-3
 
 
 class Walker(NamedTuple):
-    """Masses, arms (masses, bodies) from the stance foot, inertias of the bodies, leg length, lean of its feet, SI."""
+    """Masses, arms (masses, bodies) from the stance foot, inertias of the bodies, leg length and lean of the feet, in
+    SI units.
+    """
 
     masses: np.ndarray
     arms: np.ndarray
@@ -38,7 +41,7 @@ def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
     arms = np.zeros((6, 4), complex)
     arms[0:2, 1] = -foot_ahead
     arms[0:2, 1] += [1j * (leg - below_hip) + thigh_ahead, 1j * (lower - below_knee) + shank_ahead]
-    arms[2:, 1] = 1j * leg - foot_ahead  # the hip and all that hangs on it
+    arms[2:, 1] = 1j * leg - foot_ahead  # the hip and all bodies attached to it
     arms[3, 3] = 1j * torso[1]
     arms[4, 0], arms[5, 0] = -1j * below_hip + thigh_ahead, -1j * upper
     arms[5, 2] = -1j * below_knee + shank_ahead
@@ -48,7 +51,7 @@ def walker_of(thigh, shank, hip_mass, torso, gravity, slope, foot_ahead=0.0):
 
 
 def mass_matrix(walker, theta):
-    """Return the mass matrix for the bodies' angles (4,), and the masses' velocities per rate."""
+    """Return the mass matrix for the angles (4,) of the bodies, and the velocities of the masses per unit rate."""
     J = 1j * walker.arms * np.exp(1j * theta)
     return (J.conj().T * walker.masses @ J).real + np.diag(walker.inertias), J
 
@@ -97,10 +100,12 @@ def step(walker, z):
 
 
 def strike(walker, y):
-    """Section coordinates after the heel strike that y (8,) leads to: roles change, momenta are projected."""
+    """Return the section coordinates after a heel strike from y (8,). The legs change roles, and momenta are
+    projected.
+    """
     _, J = mass_matrix(walker, y[:4])
     velocity, spin = J @ y[4:], y[4:]
-    # the same masses and bodies, seen from the other foot
+    # the same masses and bodies, measured from the other foot
     masses, bodies = [4, 5, 2, 3, 0, 1], [1, 0, 1, 3]
     theta = y[:4][bodies]
     M, J = mass_matrix(walker, theta)

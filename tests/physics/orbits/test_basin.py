@@ -1,4 +1,4 @@
-"""Tests of basins: attractors found by walking, edges, windows, and cells that agree with single walks."""
+"""Tests of basins: attractors found by simulated walks, edges, windows, and cells that agree with single walks."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def at_slope(degrees):
 
 UNIT, STEEPER, STEEPEST = at_slope(1.0), at_slope(4.7), at_slope(5.15)
 RATE = np.sqrt(9.81)
-# published states of the paper's walker at one degree, and near the gait at 4.7
+# published states of the paper's walker at one degree, and a state near its gait at 4.7 degrees
 GAIT = np.array([0.1695390, -0.6057394 / RATE, -0.8617140 / RATE])
 STEEP_GAIT = np.array([0.2335, -0.07, -0.366])
 

@@ -1,4 +1,4 @@
-"""Check the contact gait by walking, energy and momentum, which Newton's method does not use."""
+"""Check the contact gait by long walks, energy and momentum, which Newton's method does not use."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,18 +22,18 @@ RIGID_STEP = 0.3718088
 
 
 def config_at_one_degree(*sets: str):
-    """The paper's config at one degree, changed."""
+    """Return the paper's config at one degree with some keys changed."""
     return loader.load(Path("paper"), ["slope_deg=1", *sets], None).config
 
 
 def answer_of(*sets: str) -> GaitAnswer:
-    """The contact gait of such a config."""
+    """Return the result of the search for the contact gait of such a config."""
     return contact_gait(config_at_one_degree(*sets), RIGID_STEP, RIGID_STATE)
 
 
 @pytest.fixture(scope="module")
 def gait():
-    """The gait on the paper's contact."""
+    """Return the gait on the paper's ground."""
     return answer_of().gait
 
 
@@ -54,7 +54,7 @@ def test_long_walk_on_matching_pads_settles_on_the_gait(gait):
 def test_multipliers_give_the_rate_of_approach_of_a_long_walk(gait):
     assert gait.stable
     assert abs(gait.multipliers[0]) == pytest.approx(0.54, abs=0.01)
-    # three disturbances die within the step that they are made in: the stance foot holds height and angle
+    # Three disturbances vanish within one step, because the stance foot holds height and angle.
     assert np.all(np.abs(gait.multipliers[3:]) < 1e-6)
 
 

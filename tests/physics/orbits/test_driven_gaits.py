@@ -25,13 +25,13 @@ from walkerlab.scene.rigid import rigid_walker
 
 
 def walker_of(name, **drives):
-    """A built-in walker, its numbers changed."""
+    """Return a built-in walker with some parameters changed."""
     config = loader.load(Path(name)).config
     return rigid_walker(config, config.equations).changed(**drives)
 
 
-# Kuo (2002): push-off over hip mass, spring over (foot mass l^2), slope; stance angle from the normal and its rate just
-# after the strike, period, multipliers; recomputed by a complex-step code
+# Kuo (2002), recomputed by a complex-step code: push-off over hip mass, spring over (foot mass l^2), slope; stance
+# angle from the normal and its rate just after the strike, period, multipliers.
 KUO = {
     "normal": (
         (0.1877, 2.5127, 0.0), (0.355459547231, -0.505619296924, 1.740269471592),
@@ -68,7 +68,9 @@ LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
 
 
 def test_paper_compass_walks_on_level_ground():
-    """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
+    """The push-off is 4 N s, and a spring of 10 N m/rad joins the legs. The expected values are those of an independent
+    prototype.
+    """
     walker = change_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.0, 0.0)), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
@@ -95,7 +97,7 @@ def test_derivative_of_a_driven_step_map_equals_its_slope(name):
     np.testing.assert_allclose(DP, differences, rtol=0.0, atol=AGREEMENT)
 
 
-NEAR = 0.03  # of m sqrt(g L): a push-off that level gaits of most walkers go with
+NEAR = 0.03  # push-off over m sqrt(g L) with which most walkers have a level gait
 
 
 @pytest.mark.parametrize("name", ["paper", "rigid-only", "contact-si", "torso", "round-feet", "simplest"])
@@ -108,7 +110,7 @@ def test_push_off_gives_a_stable_gait_on_level_ground(name):
 
 @pytest.mark.parametrize("slope", [0.0, -0.1])
 def test_gravity_shaping_torques_give_the_passive_gait_on_any_slope(slope):
-    """Controlled symmetry: Spong, Bullo (2005)."""
+    """This is controlled symmetry (Spong, Bullo 2005)."""
     passive = walker_of("paper")
     gait, turned = find_gaits(passive).gait, change_slope(passive, slope)
     lean = slope - passive.slope
@@ -146,7 +148,7 @@ def test_parameter_value_without_a_walker_has_no_cost_of_transport():
 
 
 def test_push_off_of_kuos_walker_costs_impulse_squared_over_twice_its_mass():
-    """Kuo (2002): the push-off comes before the strike, and legs without mass move the hip alone."""
+    """In Kuo (2002) the push-off comes before the strike and, as the legs have no mass, moves only the hip."""
     config = loader.load(Path("kuo")).config
     gait = find_gaits(rigid_walker(config)).gait
     assert gait.work["push_off"] == pytest.approx(0.0176156, abs=5e-8)
@@ -168,7 +170,7 @@ DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)}}
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_energies_of_a_driven_walk_balance(name):
-    """The heel strikes of a gait take what a step is given; a spring returns what it takes."""
+    """Heel strikes take as much energy as a step is given, and a spring returns what it has stored."""
     walker = change_slope(walker_of(name, **DRIVES[name]), 0.0)
     gait = find_gaits(walker).gait
     weight = walker.mass * walker.gravity * walker.leg_length
@@ -197,7 +199,9 @@ TURNED = {
 
 @pytest.mark.parametrize("name", TURNED)
 def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
-    """Late in the swing the legs turn back; with knees the knee strike reverses the rate between the thighs at once."""
+    """Late in the swing the legs turn back. In a kneed walker the knee strike reverses the relative rate of the thighs
+    at once.
+    """
     walker = change_slope(walker_of(name, **TURNED[name]), 0.0)
     start = find_gaits(walker).gait.state
     net, positive = torque_work_of_a_step(walker, start, take_walk(walker, EXACT_STEPS, start, 1))
@@ -210,7 +214,9 @@ def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
 
 
 def test_cost_derivative_across_a_knee_strike_equals_an_independent_slope():
-    """The parameter is the hip's spring, and the knee strike reverses the rate between the thighs."""
+    """The parameter is the stiffness of the hip spring, and the knee strike reverses the relative rate of the
+    thighs.
+    """
 
     def driven(spring):
         return change_slope(walker_of("kneed", push_off=0.2, hip=(spring, 0.0, 0.3)), 0.0)
@@ -235,7 +241,9 @@ HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4
 
 
 def test_contact_step_derivative_includes_the_change_of_driven_leg():
-    """At a touch the torque leaps from one leg to the other: forgotten, that shows in the third digit."""
+    """At a touch the torque moves from one leg to the other. If the derivative ignored this, the third digit would be
+    wrong.
+    """
     config = loader.load(Path("paper"), ["slope_deg=0.9", *HIP]).config
     scene = contact_scene(config, RIGID_STEP, RIGID_STEP)
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, NEAR_THE_GAIT, STEPS)

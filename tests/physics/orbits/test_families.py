@@ -69,7 +69,7 @@ def seeds_at(walker_at, slope):
 
 
 def period_three_start(follower):
-    """A nearly returning point of the chaotic attractor."""
+    """Find a point of the chaotic attractor that nearly returns after three steps."""
     one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     for slope in np.radians(np.linspace(5.06, 5.19, 8)):
         chaotic = settle(follower.step_map, one.points[-1].z, slope, 400, 200)
@@ -98,7 +98,7 @@ def flips_of(branches):
 
 
 def compass_step(z, slope):
-    """A step by Lagrange's equations, from and to (theta_2, dtheta_1, dtheta_2), with SciPy alone."""
+    """Take a step by Lagrange's equations with SciPy, from and to (theta_2, dtheta_1, dtheta_2)."""
 
     def mass(cos_d):
         b = L - A
@@ -125,11 +125,11 @@ def compass_step(z, slope):
 
 
 def impact_by_momenta(y):
-    """Angular momenta about the new foothold and of the trailing leg about the hip, with planar vectors."""
+    """Return the state after the impact, from the angular momenta about the new foothold and of the trailing leg about
+    the hip.
+    """
     theta = y[:2]
-    hip_to_foot = [
-        np.array([np.sin(t), -np.cos(t)]) for t in theta
-    ]  # of the leg that swings and of the one that stands
+    hip_to_foot = [np.array([np.sin(t), -np.cos(t)]) for t in theta]  # of the swing leg, then of the stance leg
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def velocities(omega, standing):
@@ -139,7 +139,7 @@ def impact_by_momenta(y):
 
     def momenta(omega, standing):
         hip, legs = velocities(omega, standing)
-        foothold = L * hip_to_foot[0]  # from the hip
+        foothold = L * hip_to_foot[0]  # position measured from the hip
         whole = M_H * cross(-foothold, hip) + sum(
             M * cross((L - A) * hip_to_foot[k] - foothold, legs[k]) for k in range(2)
         )
@@ -155,7 +155,9 @@ def cross(a, b):
 
 
 def simplest_step(z, slope):
-    """A step of the simplest walker, from and to (theta, dtheta) from the slope's normal (Garcia et al. 1998)."""
+    """Take a step of the simplest walker (Garcia et al. 1998), from and to (theta, dtheta), measured from the slope's
+    normal.
+    """
 
     def rates(_t, y):
         theta, phi, omega, rate = y
@@ -174,7 +176,7 @@ def simplest_step(z, slope):
 
 
 def multiplier_by_differences(step, z, slope):
-    """The smallest real multiplier of the gait near z, by Newton's method on central differences."""
+    """Return the smallest real multiplier of the gait near z, found by Newton's method with central differences."""
 
     def derivative(at):
         h = 1e-5
@@ -224,7 +226,7 @@ def test_first_flip_agrees_with_an_independent_integration(walker_at, step, span
 
 def test_compass_cascade_is_followed_automatically():
     flips = flips_of(compass_family())
-    assert np.degrees(flips[(1, "flip")]) == pytest.approx(4.39, abs=5e-3)  # 0.02 deg above what is printed
+    assert np.degrees(flips[(1, "flip")]) == pytest.approx(4.39, abs=5e-3)  # 0.02 deg above the printed value
     assert np.degrees(flips[(2, "flip")]) == pytest.approx(4.9, abs=0.03)  # Goswami et al. 1996
     assert np.degrees(flips[(4, "flip")]) == pytest.approx(5.01, abs=5e-3)  # Goswami et al. 1998
     ratios = feigenbaum_ratios([flips[(period, "flip")] for period in (1, 2, 4, 8)])
@@ -333,20 +335,20 @@ def test_lyapunov_exponent_is_positive_in_chaos_and_negative_on_a_stable_gait():
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
 def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
-    """The means are those of normal noise with mean 0, whose correlation falls e-fold in some number of steps."""
+    """Average normal noise with mean 0, whose correlation falls e-fold in some number of steps."""
     kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
     for step in range(1, noise.shape[1]):
         noise[:, step] += kept * noise[:, step - 1]
     blocks = [min(64, independent_blocks(walk)) for walk in noise]
     off = [abs(walk.mean()) / standard_error(walk, count) for walk, count in zip(noise, blocks, strict=True)]
     assert min(blocks) >= 10
-    # of normal noise by ten blocks (Student's distribution) 0.077, and twice the standard error of 400 walks
+    # For normal noise in ten blocks it is 0.077 (Student's distribution). Allow twice the standard error of 400 walks.
     assert np.mean(np.array(off) > 2.0) < 0.077 + 2.0 * np.sqrt(0.077 * 0.923 / 400)
 
 
 def test_lyapunov_exponent_agrees_with_a_walk_fifty_times_longer():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.0, 0.1))
-    start = seeds_at(paper_walker, 0.07)[-1].z  # the longer gait, stable there
+    start = seeds_at(paper_walker, 0.07)[-1].z  # The gait with the longer period is stable there.
     attractor = sweep_attractor(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
     short, long = (largest_exponent(follower.step_map, attractor.last, attractor.value, 96, n) for n in (1500, 75_000))
     assert abs(short.exponent - long.exponent) < 2.5 * short.uncertainty
@@ -373,7 +375,7 @@ def test_three_step_gait_appears_at_a_fold():
     assert fold.value == pytest.approx(0.0676036, abs=1e-6)
 
 
-# slope, and section coordinates of the simplest walker's gaits of six steps there
+# slope, and section coordinates of the gaits of six steps of the simplest walker on it
 SIX_STEPS = [
     (0.0184722331, [0.23890028, -0.21595813, -0.24810845]),
     (0.019, [0.24535244, -0.21996040, -0.25474270]),
@@ -415,7 +417,7 @@ def test_flip_curves_pass_through_flips_located_for_other_masses():
     assert heavy == 12.0
     heavier = family(lambda slope: paper_walker(slope)._replace(hip_mass=12.0), 0.06, 0.09, 0.07, 1)
     (elsewhere,) = [one for b in heavier for one in b.bifurcations]
-    assert curve.first[index] == pytest.approx(elsewhere.value, abs=1e-5)  # the curve's end is interpolated
+    assert curve.first[index] == pytest.approx(elsewhere.value, abs=1e-5)  # The end of the curve is interpolated.
 
 
 def test_branch_ends_at_the_last_valid_parameter_value():
@@ -452,7 +454,7 @@ def test_branch_that_exhausts_its_points_says_so():
 
 
 def test_closed_branch_is_traced_once_from_any_start():
-    """The compass pushed uphill has gaits between two impulses alone, on one closed curve."""
+    """The compass pushed uphill has gaits only between two impulses, and they form one closed curve."""
     uphill = change_slope(assembled(paper_walker(0.0)), np.radians(-0.25))
     pushed = RigidMap(lambda impulse: uphill.changed(push_off=impulse), 7.0, uphill)
     _, units = unit_walker(uphill)
@@ -472,7 +474,7 @@ def test_closed_branch_is_traced_once_from_any_start():
 
 
 class Circle:
-    """x^2 + y^2 = 1, which folds twice over either unknown."""
+    """The equation x^2 + y^2 = 1, whose solutions fold twice over either unknown."""
 
     def __call__(self, x):
         return Evaluated(Outcome.WALKED, np.array([x @ x - 1.0]), 2.0 * x[None, :], None)
@@ -501,15 +503,15 @@ def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
 
 
-def test_a_complex_pair_gives_a_direction_in_its_own_plane():
-    """Also if another multiplier equals the pair's real part, which is then nearest to being singular."""
+def test_direction_of_a_complex_pair_lies_in_the_plane_of_the_pair():
+    """The direction lies in that plane even if another multiplier equals the real part of the pair."""
     pair = 1.2 * np.exp(1j)
     basis = np.random.default_rng(0).normal(size=(3, 3))
     turning = np.array([[pair.real, -pair.imag, 0.0], [pair.imag, pair.real, 0.0], [0.0, 0.0, pair.real]])
     A = basis @ turning @ np.linalg.inv(basis)
     direction = eigenvector(A, pair)
     assert np.linalg.norm(direction) > 0.5
-    # in the plane, A satisfies the pair's own quadratic equation
+    # In the plane, A satisfies the quadratic equation of the pair.
     squared = A @ A @ direction - 2.0 * pair.real * A @ direction + abs(pair) ** 2 * direction
     assert squared == pytest.approx(np.zeros(3), abs=1e-12)
 
@@ -537,7 +539,7 @@ def test_slowly_settling_walk_has_the_period_of_its_limit():
 
 
 class LostBeyond:
-    """A step map that settles on nothing, up to a value beyond which the walker falls."""
+    """Step map whose walks never settle, and fall beyond some value."""
 
     def __init__(self, most):
         self.most = most

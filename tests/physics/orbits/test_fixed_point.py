@@ -1,4 +1,4 @@
-"""Compare gaits with numbers known from elsewhere, and check the rules of every search."""
+"""Compare gaits with independently known values, and check the rules of the search."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -53,7 +53,7 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-15, 10**5)
 
 
 class Counted(RigidStepper):
-    """A step map that counts its own steps."""
+    """Step map that counts how often it is evaluated."""
 
     def __init__(self, like, tolerances):
         super().__init__(like, tolerances)
@@ -71,7 +71,7 @@ def shooting(walker):
 
 
 def solve(shooting, walker, z, tolerance):
-    """Run Newton's method for a walker in its own units, counting steps."""
+    """Run Newton's method for a walker in its natural units, and count the steps."""
     section = strike_section(assembled(walker))
 
     def mismatch(z):
@@ -83,7 +83,7 @@ def solve(shooting, walker, z, tolerance):
     return newton(mismatch, np.array(z), Effort(tolerance, 60, SHORTEST_MOVE))
 
 
-# from two other integrations of the same equations
+# from two independent integrations of the same equations
 KNOWN = {
     1.0: ((-0.2044455, 0.1695390, -0.6057394, -0.8617140), 0.7036485, 0.3718088, 0.36256 + 0.46032j, 0.21568),
     3.0: ((-0.3233886, 0.2186688, -0.3773739, -1.0923836), 0.7343464, 0.5354454, -0.19973 + 0.54448j, 0.13157),
@@ -106,7 +106,7 @@ def test_gait_at_three_degrees_has_the_published_period():
 
 
 def test_gait_loses_stability_by_period_doubling_a_little_above_the_published_slope():
-    # printed at 4.37 deg by Goswami, Thuilot, Espiau 1996; for these equations it lies 0.02 deg higher
+    # Goswami, Thuilot and Espiau (1996) print 4.37 deg. For these equations it is 0.02 deg higher.
     before, after = (find_gaits(on_slope(degrees)).gaits[-1] for degrees in (4.39, 4.392))
     assert before.stable
     assert not after.stable
@@ -124,7 +124,7 @@ def test_printed_equations_have_the_fixed_point_of_the_paper():
     gait = find_gaits(PRINTED).gait
     assert gait.state == pytest.approx((-0.202216, 0.167416, -0.600581, -0.846575), abs=6e-7)
     assert gait.period == pytest.approx(0.706384, abs=6e-7)
-    # (11), to the digits it prints: -0.84 is cut, not rounded
+    # equation (11), to the digits that it prints, where -0.84 is cut off and not rounded
     assert [round(value, 4) for value in gait.state[:2]] == [-0.2022, 0.1674]
     assert [np.trunc(100 * value) / 100 for value in gait.state[2:]] == [-0.60, -0.84]
 
@@ -165,7 +165,7 @@ def test_following_a_seed_costs_at_most_thirty_steps():
     step_map = map_over_slope(walker, SEARCH_TOLERANCES)
     counted = step_map._exact = Counted(walker, SEARCH_TOLERANCES)
     assert SlopeBranch(step_map, seeds(walker)[0]).follow(walker.slope)[1] is not None
-    # one step of walking takes about 200 right-hand sides
+    # A step takes about 200 right-hand sides.
     assert counted.steps <= 30
     assert counted.evaluations < 30 * 200
 
@@ -213,7 +213,7 @@ def test_strike_impulse_equals_the_momentum_change_of_the_masses(walker, gravity
             assert gait.min_normal_impulse == pytest.approx(changes[1], abs=1e-9)
             ratio = abs(changes[0]) / changes[1] if changes[1] > 0.0 else None
             assert gait.max_impulse_ratio == (None if ratio is None else pytest.approx(ratio, rel=1e-9))
-        else:  # or that of the knee's strike
+        else:  # or that of the knee strike
             assert gait.min_normal_impulse <= changes[1] + 1e-9
         assert any("in a strike" in one for one in gait.objections) == (gait.min_normal_impulse < 0.0)
 
@@ -236,7 +236,7 @@ def test_gait_whose_feet_meet_on_the_ground_is_excluded():
     faster = [*symmetric.state]
     faster[2] += 1e-7
     step = take_walk(walker, TIGHT, tuple(faster), 1)
-    assert step.lengths_m[0] < 1e-6 * symmetric.step_length  # the swing foot strikes on its way back
+    assert step.lengths_m[0] < 1e-6 * symmetric.step_length  # The swing foot lands as it swings back.
 
 
 def test_strongly_unstable_gait_can_be_simulated():
@@ -248,8 +248,8 @@ def test_strongly_unstable_gait_can_be_simulated():
     assert rejected.objections == ("the trailing foot would have to pass through the ground",)
 
 
-# hip of mass 1, next to nothing in the feet, g = L = 1, slope 0.009 (Garcia et al. 1998), recomputed by two other
-# routes: (stance angle from the normal, its velocity, period, largest multiplier)
+# (stance angle from the normal, its velocity, period, largest multiplier) for a hip of mass 1, tiny masses in the feet,
+# g = L = 1 and slope 0.009 (Garcia et al. 1998), recomputed by two independent routes
 SIMPLEST = {
     LONG_PERIOD: (0.200310900544, -0.199832473005, 3.882464, -0.1900998 + 0.5575988j),
     SHORT_PERIOD: (0.193937369810, -0.203866927442, 3.096106, 4.003864),
@@ -262,7 +262,7 @@ def test_simplest_walker_has_the_published_gaits(foot_mass, name):
     angle, velocity, period, multiplier = SIMPLEST[name]
     walker = RigidWalker(1.0, 0.0, foot_mass, 1.0, 0.0, 1.0, 0.009, CORRECTED)
     gait = next(gait for gait in find_gaits(walker).gaits if name in gait.found_by)
-    # what a foot of this mass changes
+    # effect of the mass of the feet
     small = max(2e-9, 2.0 * foot_mass)
     assert (gait.state[1] + walker.slope, gait.state[3]) == pytest.approx((angle, velocity), abs=small)
     assert gait.period == pytest.approx(period, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Gaits of walkers whose legs differ, checked by a plain integration of both swings."""
+"""Check gaits of walkers whose legs differ with a plain integration of both swings."""
 
 from dataclasses import replace
 
@@ -67,7 +67,8 @@ def test_stride_multipliers_equal_differences_of_plain_integrations():
     exact = RigidMap(lambda _: walker, 1.0, walker)
     DP = walk_steps(exact, np.array(gait.z), 0.0, 2).DP
     tau = np.sqrt(walker.leg_length / walker.gravity)
-    scales = np.array([tau, 1.0, 1.0])  # of theta_2 by rates in sqrt(g/L), and of rates by rates
+    # Rates are in sqrt(g/L), so derivatives of theta_2 by rates have a unit, and those of rates by rates have none.
+    scales = np.array([tau, 1.0, 1.0])
     np.testing.assert_allclose(DP[:, 1:] * scales[:, None], np.array(columns)[:, [1, 2, 3]].T, atol=1e-7)
     assert np.abs(np.linalg.eigvals(DP)).max() == pytest.approx(gait.spectral_radius**2)
 
@@ -137,7 +138,7 @@ def test_averaging_two_legs_gives_equal_legs_in_either_order():
     (0.1, 0.0162, False), (0.1, 0.0182, True), (0.1, 0.04, True), (0.1, 0.0495, True),
 ])  # fmt: skip
 def test_one_kneed_and_one_straight_leg_walk_stably_on_the_published_slopes(damping, slope, walks):
-    # Miandoab and Beigzadeh, Nonlinear Dynamics 111 (2023): .0235 to .0470 rad, with damping .1 from .0172 to .0505
+    # Miandoab and Beigzadeh, Nonlinear Dynamics 111 (2023): 0.0235 to 0.0470 rad, and 0.0172 to 0.0505 with damping 0.1
     kneed = Leg((Segment(0.379, 8.76, 0.143, 0.0, 0.129), Segment(0.388, 2.70, 0.157, 0.0, 0.032)), 0.0)
     straight = Leg((Segment(0.767, 11.46, 0.235, 0.0, 0.479),), 0.0)
     plain = Walker((kneed, straight), 37.08, slope, knee_damping=(damping, 0.0))
@@ -149,7 +150,7 @@ def test_one_kneed_and_one_straight_leg_walk_stably_on_the_published_slopes(damp
 
 
 def gait_on_map(walker):
-    """The gait of a walker on its own step map, whose parameter is the slope."""
+    """Return the gait of a walker on its step map, whose parameter is the slope."""
     gait = best(walker)
     unit, units = unit_walker(walker)
     step_map = RigidMap(lambda slope: change_slope(walker, slope), 1.0, walker)

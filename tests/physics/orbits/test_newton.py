@@ -8,7 +8,9 @@ from walkerlab.physics.orbits.newton import Effort, Evaluated, NotConverged, Sol
 
 
 class Counted:
-    """A function of one number with its derivative, and how often it was evaluated; no value where it is not finite."""
+    """Function of one variable with its derivative, which counts evaluations. It has no value where it is not
+    finite.
+    """
 
     def __init__(self, f, slope):
         self.f, self.slope, self.evaluations = f, slope, 0
@@ -27,7 +29,7 @@ def flat_arc():
 
 
 def test_overshooting_newton_step_is_halved_on_request():
-    # beyond 1.39 Newton's method on the arc tangent runs away
+    # Beyond 1.39, Newton's method for the arc tangent diverges.
     damped = newton(flat_arc(), np.array([3.0]), Effort(1e-14, 60, 2.0**-8))
     assert isinstance(damped, Solution)
     assert damped.x[0] == pytest.approx(0.0, abs=1e-14)

@@ -1,4 +1,4 @@
-"""Gaits of published walkers, to the digits that independent computations agree on."""
+"""Check gaits of published walkers to the digits on which independent computations agree."""
 
 import math
 
@@ -21,8 +21,8 @@ MCGEER = straight_legs(Limb(1.0, 1.0, 0.37, 0.0, 0.32**2), 0.0, Arc(0.3))
 SIMPLEST = straight_legs(Limb(1.0, 1e-12, 1.0), 1.0, Arc())
 HSU_CHEN = kneed_legs(Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5, Arc())
 # parts, slope, gravity; stance angle from the slope's normal, rates of stance and swing leg; period; multipliers.
-# Wisse (2003), MATLAB files; McGeer (1990), section 5; Garcia et al. (1998); Hsu Chen (2007). Digits recomputed by two
-# independent routes; the printed ones of Hsu Chen (.2381, -1.1014, -.0399) err in the third place.
+# Wisse (2003), MATLAB files; McGeer (1990), section 5; Garcia et al. (1998); Hsu Chen (2007). Digits are recomputed by
+# two independent routes. Those that Hsu Chen prints (0.2381, -1.1014, -0.0399) are wrong in the third decimal.
 PUBLISHED = {
     "round feet": (
         ROUND_FEET, 0.01, 9.81, (0.2015446889, -1.4051631609, -1.1204588165), 0.450270, (0.65445, 0.21718 + 0.30366j)
@@ -42,7 +42,7 @@ TIGHT = Tolerances("dop853", 1e-13, 1e-16, 10**6)
 
 
 def solved(model, z):
-    """The gait near z, in SI, and its cycle."""
+    """Return the gait near z, in SI units, and its cycle."""
     scale = np.array([1.0, *[unit_walker(model)[1].time] * (z.size - 1)])
     found = gait_near(RigidMap(lambda _: model, 1.0, model, TIGHT), z * scale, 0.0, Effort(1e-13))
     return found.z / scale, found
@@ -51,7 +51,8 @@ def solved(model, z):
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_gait_of_a_published_walker_is_reproduced(name):
     parts, slope, gravity, (angle, stance, swing), period, multipliers = PUBLISHED[name]
-    massless = stance * (1.0 - math.cos(2.0 * angle))  # the trailing foot's momentum about the hip is lost
+    # The angular momentum of the trailing foot about the hip is lost.
+    massless = stance * (1.0 - math.cos(2.0 * angle))
     z, gait = solved(
         rigid_on_slope(parts, gravity, slope), np.array([angle - slope, massless if swing is None else swing, stance])
     )

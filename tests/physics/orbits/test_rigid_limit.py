@@ -1,4 +1,4 @@
-"""Tests of orders and limits of series that are known exactly, and of the effect of settings."""
+"""Tests of the order and limit of series for which both are known, and of the effect of settings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +29,7 @@ from walkerlab.scene.rigid import rigid_walker
 
 
 def distances(periods, ratio):
-    """Return the distances of settings, each `ratio` times as rigid as the one before."""
+    """Return the distances of settings from the rigid limit. Each is `ratio` times as rigid as the one before."""
     return [
         Distance(ContactFactors("made up", ratio**i, 1.0, 1.0, 1.0), period, 0.3, 0.0, 0.0, 0.0, 0.0)
         for i, period in enumerate(periods)
@@ -74,7 +74,7 @@ def test_full_damping_penetration_scales_with_static_penetration():
 
 
 def test_gait_with_push_off_converges_to_the_rigid_one_in_first_order():
-    """The pulse shortens as the ground stiffens. With a pulse of constant duration there is no gait nearby."""
+    """The pulse must shorten as the ground stiffens. With a pulse of constant duration there is no gait nearby."""
     config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
     rigid = find_gaits(rigid_walker(config, config.equations)).gait
     scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)

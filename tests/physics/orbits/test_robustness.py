@@ -48,7 +48,7 @@ def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):
 
 
 def on_compliant_ground(name, key="slope_rad", changes=()):
-    """Return the same on the contact model's section, off its pads."""
+    """Return the same on the section of the contact model, on ground without pads."""
     config = load(Path(name), changes).config
     rigid = standpoint(name, changes=changes)
     walker = rigid_walker(config, config.equations)
@@ -63,7 +63,9 @@ def on_compliant_ground(name, key="slope_rad", changes=()):
 
 
 def test_sensitivity_norm_of_the_simplest_walker_agrees_with_two_other_codes():
-    """Floor drop to step period, gamma .009, l = g = 1: direct part and norm."""
+    """Compare the direct part and the norm of the sensitivity of the step period to a floor drop, for gamma = 0.009 and
+    l = g = 1.
+    """
     answer = sensitivity(standpoint("simplest"), "floor-drop")
     units = standpoint("simplest").units
     to_pure = units.length / units.time
@@ -74,7 +76,7 @@ def test_sensitivity_norm_of_the_simplest_walker_agrees_with_two_other_codes():
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet", "torso"])
 def test_sensitivity_norm_equals_a_brute_force_sum(name, disturbance):
-    """Every step of a long walk from a gait that was disturbed a little either way, summed."""
+    """Disturb a gait slightly in both directions, and sum over every step of the long walks that follow."""
     at = standpoint(name)
     unit, steps = at.unit_of(disturbance), 60
     walks = {k: walk_disturbed(at, disturbance, k * 1e-5 * unit, steps) for k in (-2, -1, 1, 2)}
@@ -89,7 +91,7 @@ def test_sensitivity_norm_equals_a_brute_force_sum(name, disturbance):
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize("name", ["paper", "kneed"])
 def test_sensitivity_norm_on_compliant_ground_equals_a_brute_force_sum(name, disturbance):
-    """Quotients that reach over more than the ground gives way to are 0.5 % off for a kneed walker."""
+    """For a kneed walker, difference quotients over more than the penetration would be off by 0.5 %."""
     at = on_compliant_ground(name)
     size, steps = 2e-6 * at.unit_of(disturbance), 40
     either = [indicators(walk_disturbed(at, disturbance, sign * size, steps)) for sign in (1.0, -1.0)]
@@ -114,13 +116,13 @@ def test_lyapunov_equation_gives_the_norm_of_stable_gaits_only():
 
 
 def test_hip_push_keeps_the_foot_fixed_and_acts_along_the_hip_lever():
-    """The moment of momentum about the foot grows by the impulse times the hip's height, and by nothing else."""
+    """The angular momentum about the foot must grow by exactly the impulse times the height of the hip."""
     at = standpoint("slope-3deg")
     walker = at.step_map._unit_at(at.p).walker
     y = np.array(state_on_section(walker, at.z))
     pushed = push_at_hip(walker, y, 1e-3)
     np.testing.assert_array_equal(pushed[: y.size // 2], y[: y.size // 2])
-    # work of an impulse: the mean velocity of the hip along the slope, before and after
+    # The work of an impulse is that impulse times the mean of the hip velocities before and after.
     height = walker.radius + np.cos(y[1] + walker.slope) * walker.hip_y
     hip_velocity = -0.5 * height * (y[3] + pushed[3])
     assert sum(energies(walker, pushed)) - sum(energies(walker, y)) == pytest.approx(1e-3 * hip_velocity, rel=1e-10)
@@ -128,7 +130,9 @@ def test_hip_push_keeps_the_foot_fixed_and_acts_along_the_hip_lever():
 
 
 def test_hip_push_comes_after_the_release_of_the_trailing_knee():
-    """It turns the free shank, whose moment of momentum about its knee stays; the norm is that of another code."""
+    """The push turns the free shank, whose angular momentum about the knee is conserved. The expected norm is from an
+    independent program.
+    """
     at = standpoint("kneed")
     walker = at.step_map._unit_at(at.p).walker
     n, y = len(walker.arm_x), np.array(state_on_section(walker, at.z))
@@ -165,7 +169,9 @@ def test_compass_takes_the_known_number_of_steps_on_rough_ground():
 
 
 def test_too_short_landing_ends_a_walk_on_rough_ground():
-    """The level compass, 1 mm: its fourth walk comes down once more after a sixth step, by a library's integrator."""
+    """For the level compass and 1 mm, a library's integrator shows that the foot lands too close after the sixth step
+    of the fourth walk.
+    """
     at = standpoint("level")
     walker, units = at.step_map._unit_at(at.p)[:2]
     length = at.step_map.step(at.z, at.p).length_m / units.length
@@ -177,7 +183,9 @@ def test_too_short_landing_ends_a_walk_on_rough_ground():
 
 
 def rimless_wheel(deviation_deg, walks, most, seed=0):
-    """Steps of Byl and Tedrake's rimless wheel on slopes drawn step by step (2009): alpha pi/8, mean slope 8 deg."""
+    """Count the steps of the rimless wheel of Byl and Tedrake (2009) on random slopes, with alpha = pi/8 and a mean
+    slope of 8 deg.
+    """
     generator, alpha, ratio = np.random.default_rng(seed), np.pi / 8, 9.8
     slope = np.deg2rad(8.0)
     steps, alive = np.zeros(walks), np.ones(walks, bool)
@@ -203,7 +211,9 @@ def test_rimless_wheel_takes_the_published_mean_number_of_steps(deviation, mean)
 
 
 def expected_steps(deviation_deg, cells=300):
-    """Steps to failure of the wheel by the second eigenvalue of the transition between cells of its squared rate."""
+    """Return the expected number of steps until the wheel fails, from the second eigenvalue of the transition matrix
+    between cells of its squared rate.
+    """
     alpha, ratio = np.pi / 8, 9.8
     slope = np.deg2rad(8.0 + deviation_deg * np.linspace(-6.0, 6.0, 601))
     weight = np.exp(-0.5 * np.linspace(-6.0, 6.0, 601) ** 2)
@@ -224,7 +234,7 @@ def expected_steps(deviation_deg, cells=300):
 
 @pytest.mark.parametrize(("deviation", "mean"), [(1.5, 6.54e5), (2.0, 4324.0), (2.5, 412.0), (3.0, 114.0)])
 def test_mean_steps_of_the_rimless_wheel_follow_from_the_second_eigenvalue(deviation, mean):
-    """Failure is absorbing, with the eigenvalue 1; the next one says how long the wheel goes on."""
+    """Failure is absorbing and has the eigenvalue 1. The next eigenvalue says how long the wheel goes on."""
     assert expected_steps(deviation) == pytest.approx(mean, rel=0.01)
 
 
@@ -251,7 +261,7 @@ def test_gradients_equal_differences_of_converged_gaits(name, key):
 
     by_difference, sizes = derivative(numbers_at, 3e-3 * abs(at.p)), gait_quantities(at)
     for one, expected in zip(GAIT_QUANTITIES, by_difference, strict=True):
-        # differences leave rounding in proportion to the quantity: that of a derivative of zero is all there is
+        # Rounding of a difference is proportional to the quantity. Where the derivative is zero, only rounding is left.
         rounding = 1e-9 * max(1.0, sizes[one])
         assert found[one].value == pytest.approx(expected, rel=1e-6, abs=rounding), one
         assert found[one].error < 1e-5 * abs(expected) + rounding
@@ -259,7 +269,9 @@ def test_gradients_equal_differences_of_converged_gaits(name, key):
 
 @pytest.mark.parametrize(("name", "key"), [("paper", "walker.foot_to_mass_m"), ("kneed", "walker.hip_mass_kg")])
 def test_gradients_on_compliant_ground_equal_differences_of_converged_gaits(name, key):
-    """This includes measures that put a foot of the same section coordinates in the air, or millimetres deep."""
+    """This includes parameters whose change lifts a foot into the air, or pushes it in by millimetres, if section
+    coordinates are kept.
+    """
     at = on_compliant_ground(name, key)
     wanted = ("period_s", "step_length_m", "speed_m_s", "spectral_radius")
     found = gradients(at, abs(at.p), wanted)
@@ -310,7 +322,9 @@ def test_failed_walk_has_fewer_steps_and_an_outcome():
 
 
 def test_gradient_chooses_a_step_of_small_error():
-    """Twice the usual step leaves the range over which the level compass's gait changes smoothly with its hip."""
+    """With twice the usual step, the hip mass would leave the range over which the gait of the level compass changes
+    smoothly.
+    """
     at = on_compliant_ground("level", "walker.hip_mass_kg", ("contact.terrain=after-mid-swing",))
     found = gradients(at, abs(at.p), ("period_s",))["period_s"]
     assert not found.why

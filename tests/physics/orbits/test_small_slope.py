@@ -23,7 +23,7 @@ def linear_modes(walker, *rest, **options):
 
 
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
-# all mass at the hip, the rest in the feet
+# almost all mass at the hip, the rest in the feet
 SIMPLEST = RigidWalker(1.0, 1e-9, 1e-9, 10.0, 0.0, 1.0, 0.0, CORRECTED)
 
 
@@ -35,13 +35,13 @@ def test_simplest_walker_has_the_published_long_period_gait():
 
 
 def test_simplest_walker_has_the_published_short_period():
-    # Garcia et al. 1998: the swing leg's half period, pi
+    # Garcia et al. 1998: half the period of the swing leg, pi
     _, short = seeds(SIMPLEST)
     assert short.period == pytest.approx(np.pi, abs=1e-6)
 
 
-def test_long_period_of_massless_legs_solves_its_own_equation():
-    # without mass the swing leg is a driven pendulum: tan h = -3 tanh h
+def test_long_period_of_massless_legs_solves_the_equation_for_massless_legs():
+    # A swing leg without mass is a driven pendulum, for which tan h = -3 tanh h.
     half = symmetric_half_period(linear_modes(SIMPLEST))
     assert np.tan(half) == pytest.approx(-3.0 * np.tanh(half), rel=1e-6)
 
@@ -60,7 +60,7 @@ def test_gaits_at_small_slopes_scale_as_in_theory(name, power, sign):
         errors.append(np.abs(found / predicted - 1.0).max())
         assert gait.period == pytest.approx(seed.period, rel=1e-3)
     assert errors[0] < 2e-3
-    # the next terms of the expansion are two powers of the angles away
+    # The next terms of the expansion are smaller by two powers of the angles.
     assert errors[1] < 0.3 * errors[0]
 
 

@@ -23,7 +23,7 @@ STARTS = 3
 
 
 def with_torso():
-    """A walker whose only gait known is unstable; few starts walk at all."""
+    """Return a walker whose only known gait is unstable, and for which few starts lead to walking."""
     walker = Kneed(type="kneed", thigh=THIGH, shank=SHANK, hip_mass_kg=HIP_MASS, torso=Torso(**TORSO))
     return rigid_on_slope(assembly_of(walker, rigid=True), GRAVITY, SLOPE)
 
@@ -43,7 +43,7 @@ def test_unstable_gait_is_found_even_if_few_starts_walk(found):
     (gait,) = found.gaits
     assert not gait.stable
     assert gait.spectral_radius == pytest.approx(3.664, abs=5e-4)
-    # recomputed elsewhere: stance angle from the slope's normal, rates of stance and swing leg
+    # recomputed independently: stance angle from the slope's normal, rates of stance and swing leg
     assert gait.state[1] + SLOPE == pytest.approx(0.3604678333, abs=1e-9)
     assert gait.state[5] == pytest.approx(-0.8207701664, abs=1e-9)
     assert gait.state[4] == pytest.approx(-0.4820404150, abs=1e-9)
@@ -63,7 +63,7 @@ def test_random_starts_with_an_independent_integration_find_the_same_gait(found)
     for _ in range(STARTS):
         start = z * (1.0 + 0.01 * generator.uniform(-1.0, 1.0, 3))
         solved = fsolve(lambda z: step(walker, z)[0] - z, start, xtol=1e-11)
-        # the tolerance of the integration, grown by what solving divides by
+        # the tolerance of the integration, magnified by solving for the gait
         np.testing.assert_allclose(solved, z, atol=1e-8)
     after, period, knee = step(walker, z)
     np.testing.assert_allclose(after, z, atol=1e-8)
@@ -102,6 +102,6 @@ def test_rounding_does_not_lock_a_knee_released_into_extension(found):
         walk = take_walk(walker, SEARCH_TOLERANCES, state_on_section(walker, z), 1)
         if walk.steps:
             walked += 1
-            # a swing takes the time of a pendulum, of which rounding is a 1e-13th
+            # A swing takes about a pendulum time, and rounding is about 1e-13 of it.
             assert walk.knee_strike_time_s[0] > 1e-3
     assert walked > 10

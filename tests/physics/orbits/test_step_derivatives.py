@@ -1,4 +1,4 @@
-"""Compare derivatives of the step maps, by variational equations, with differences, and use them in Newton's method."""
+"""Compare derivatives of step maps, from variational equations, with differences, and use them in Newton's method."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -30,7 +30,7 @@ ROUNDING = 1e-13
 
 
 def slope_of(ends, z, steps):
-    """Derivative of the map `ends` at z by differences; `steps` one for each coordinate."""
+    """Return the derivative of the map `ends` at z by differences, with one of `steps` for each coordinate."""
     columns = []
     for j, h in enumerate(steps):
         along = h * np.eye(z.size)[j]
@@ -40,7 +40,9 @@ def slope_of(ends, z, steps):
 
 
 def is_quadratic(residuals):
-    """Whether each of at least three residuals is of the order of the square of the one before, down to rounding."""
+    """Whether there are at least three residuals, each of the order of the square of the previous one, down to
+    rounding.
+    """
     seen = [residual for residual in residuals if residual > ROUNDING]
     factors = [after / before**2 for before, after in pairwise(seen)]
     return len(seen) >= 3 and max(factors) < 100.0
@@ -56,7 +58,7 @@ OFF_THE_GAIT = {"at the gait": (0.0, 0.0, 0.0), "wider": (5e-3, -2e-2, 1e-2), "s
 
 
 def unit_map(walker):
-    """The step map of a walker that is its own unit walker."""
+    """Return the step map of a walker that has unit size."""
     unit = unit_walker(assembled(walker))[0]
     return RigidMap(lambda _: unit, 1.0, unit, Tolerances("dop853", 1e-13, 1e-15, 10**5))
 
@@ -70,7 +72,7 @@ def beside_the_gait(walker, offset):
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
 @pytest.mark.parametrize("name", WALKERS)
 def test_rigid_step_derivative_equals_its_slope(name, offset):
-    """It goes through the swing by the variational equations, and through the heel strike by the saltation matrix."""
+    """The derivative passes the swing by the variational equations, and the heel strike by the saltation matrix."""
     walker = WALKERS[name]
     step_map, z = unit_map(walker), beside_the_gait(walker, offset)
 
@@ -88,7 +90,7 @@ def test_newton_converges_quadratically_on_the_rigid_step_map(name):
     walker = WALKERS[name]
     step_map, z, residuals = unit_map(walker), beside_the_gait(walker, "wider"), []
     while not residuals or residuals[-1] > ROUNDING:
-        # one move: it ends with the first residual that is any smaller
+        # This makes one move only, because the search stops at the first smaller residual.
         found = gait_near(step_map, z, 0.0, Effort(0.999 * residuals[-1] if residuals else 1.0))
         z = found.z
         residuals.append(found.residual)
@@ -97,11 +99,11 @@ def test_newton_converges_quadratically_on_the_rigid_step_map(name):
 
 # ---- contact -------------------------------------------------------------------------------------------------------
 
-RIGID_STEP = 0.3718088  # of the rigid gait at one degree
-PITCH = 0.3687  # about that of the contact gait
+RIGID_STEP = 0.3718088  # step length of the rigid gait at one degree
+PITCH = 0.3687  # about the step length of the contact gait
 NEAR_THE_GAIT = np.array([0.74974553, 0.00538217, 0.43231631, 0.00982748, 1.3485189, -0.29964029])
 ASIDE = np.array([1e-5, 2e-3, 1e-3, 1e-4, 5e-3, -5e-3])
-# the ground answers to a change in height within a fraction of the penetration, a tenth of a millimetre
+# The force changes over a fraction of the penetration, which is a tenth of a millimetre, so the step must be smaller.
 STEPS = (7e-7, 3e-5, 3e-5, 3e-5, 3e-5, 3e-5)
 
 
@@ -119,7 +121,9 @@ def stepped(scene, z, tolerance):
 
 @pytest.mark.parametrize("z", [NEAR_THE_GAIT, NEAR_THE_GAIT + ASIDE], ids=["at the gait", "off it"])
 def test_contact_step_derivative_equals_finite_differences(scene, z):
-    """It goes through touches, releases and all other switching points of the force law, where the Jacobian jumps."""
+    """The derivative passes touches, releases and all other switching points of the force law, where the Jacobian
+    jumps.
+    """
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, z, STEPS)
     np.testing.assert_allclose(stepped(scene, z, 1e-12).DP, slope, rtol=0.0, atol=AGREEMENT)
 
@@ -133,7 +137,7 @@ def test_contact_derivative_converges_with_the_tolerance(scene):
 
 
 def test_newton_converges_quadratically_on_the_contact_step_map(scene):
-    # the walk's own error has to be below the last residual
+    # The error of the walk has to be below the last residual.
     tolerances = Tolerances("radau5", 1e-11, 1e-13, 10**6)
 
     def moves(tolerance):
@@ -141,7 +145,7 @@ def test_newton_converges_quadratically_on_the_contact_step_map(scene):
         found = newton(lambda z: walk_steps(pads, z, 0.0, 1).mismatch(), NEAR_THE_GAIT + ASIDE, Effort(tolerance))
         return found.corrections, found.evaluated.residual
 
-    # a tolerance between two residuals shows each of them
+    # Tolerances between two residuals show each residual in turn.
     residuals = dict(moves(10.0**-digits) for digits in range(2, 11))
     assert is_quadratic([residuals[move] for move in sorted(residuals)])
     assert max(residuals) <= 4

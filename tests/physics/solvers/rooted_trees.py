@@ -8,7 +8,7 @@ import numpy as np
 
 @cache
 def trees(order):
-    """Rooted trees of an order: each the sorted tuple of its root's subtrees."""
+    """Return the rooted trees of an order. Each is the sorted tuple of the subtrees of its root."""
     if order == 1:
         return ((),)
     return tuple(sorted({tuple(sorted(forest)) for forest in forests(order - 1)}))
@@ -32,7 +32,7 @@ def density(tree):
 
 
 def stage_weights(A, tree):
-    """Elementary weight of each stage: the product over the subtrees of A times theirs."""
+    """Return the elementary weight of each stage: the product, over all subtrees, of A times their weights."""
     weights = np.ones(len(A))
     for subtree in tree:
         weights = weights * (A @ stage_weights(A, subtree))

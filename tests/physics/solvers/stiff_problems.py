@@ -1,4 +1,4 @@
-"""Stiff and smooth problems, the ends of the stiff ones, and a kernel that solves them with Radau."""
+"""Stiff and smooth problems, the published ends of the stiff ones, and a kernel that solves them with Radau."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,12 +12,12 @@ ROBERTSON, HIRES = range(2)
 
 
 class Planar(NamedTuple):
-    """Problems in the plane; one type, so that they compile once."""
+    """Problems in the plane. They have one type, so that they compile only once."""
 
     kind: int
-    real: float  # eigenvalue of LINEAR; of CURVE how strongly it is pulled to (sin t, cos t); eps of VAN_DER_POL
+    real: float  # for LINEAR the eigenvalue, for CURVE the strength of the pull to (sin t, cos t), for VAN_DER_POL eps
     imaginary: float
-    told: float  # the part of the Jacobian that is told: 1 is all
+    told: float  # fraction of the Jacobian that the method gets
 
 
 @block.case(Planar)
@@ -116,7 +116,7 @@ STIFF = Planar(VAN_DER_POL, 1e-6, 0.0, 1.0)  # mu = 1 / eps = 1e6
 
 @kernel
 def drive(method: Any, system: Any, t: float, y: Any, h: float, t_end: float) -> int:
-    """Integrate from t to t_end; with h > 0 in fixed steps of that length, each begun anew."""
+    """Integrate from t to t_end. If h > 0, take fixed steps of that length, and start the method again for each."""
     begin(method, system, t, y, h)
     while method.clock[T] < t_end:
         status = advance(method, system, t_end if h == 0.0 else min(t_end, method.clock[T] + h))

@@ -58,7 +58,7 @@ def test_tableau_nodes_equal_the_row_sums_of_their_stages():
 
 @pytest.mark.parametrize("order", range(1, 9))
 def test_solution_meets_every_order_condition_up_to_8(order):
-    # coefficients have 30 digits on paper and 16 here, products grow to some tens
+    # Coefficients have 16 digits here, and their products can be as large as some tens.
     assert defects(B, order) == pytest.approx([0.0] * len(rooted_trees.trees(order)), abs=1e-14)
 
 
@@ -78,7 +78,7 @@ def test_error_weights_belong_to_solutions_of_order_5_and_3(error, order):
 
 
 class Pair(NamedTuple):
-    """y1' = y1 cos t, y2' = -t y2: exp(sin t) and exp(-t^2 / 2)."""
+    """The equations y1' = y1 cos t and y2' = -t y2, with the solutions exp(sin t) and exp(-t^2 / 2)."""
 
 
 @block.case(Pair)
@@ -96,7 +96,7 @@ def pair_solution(t):
 
 
 class Arenstorf(NamedTuple):
-    """A satellite of earth and moon; Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2)."""
+    """Satellite in the field of earth and moon (Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2))."""
 
     moon: float
 
@@ -123,9 +123,8 @@ def arenstorf_derivative(system, t, y, f):
 
 @kernel
 def integrate(method, system, y, t_end, h, fraction, sample):
-    """Integrate from 0 to t_end in steps of h, or of the method's choice.
-
-    Keep the last step's dense output at `fraction`.
+    """Integrate from 0 to t_end in steps of h, or in steps that the method chooses. Keep the dense output of the last
+    step at `fraction`.
     """
     begin(method, system, 0.0, y, h)
     status = STEP_DONE
@@ -151,13 +150,13 @@ def observed_order(errors):
 
 
 def test_observed_order_is_8():
-    # coarse enough to stand out from rounding, fine enough for the leading term
+    # The steps are so long that errors exceed rounding, and so short that the leading term dominates.
     errors = [np.abs(fixed_steps(steps)[0] - pair_solution(1.5)).max() for steps in (6, 12)]
     assert observed_order(errors) == pytest.approx(8.0, abs=0.5)
 
 
 def test_dense_output_is_of_order_7():
-    # within a step the error is that of the polynomial, h^8 of one step, beside which the solution's hardly counts
+    # Within a step, the error of the polynomial, h^8, dominates that of the solution.
     errors = []
     for steps in (6, 12):
         time = 1.5 - 0.63 * 1.5 / steps
@@ -190,7 +189,7 @@ def orbit(rtol, budget=10**6):
 def test_arenstorf_orbit_closes():
     status, end, counts = orbit(1e-13)
     assert status == STEP_DONE
-    # a tolerance of 1e-13, magnified by the encounters with the moon
+    # the tolerance of 1e-13, magnified by the encounters with the moon
     assert end == pytest.approx(ORBIT_START, abs=1e-7)
     assert counts[REJECTED] > 0
 
@@ -217,7 +216,7 @@ def test_scipy_dop853_needs_the_same_work_for_the_same_error(rtol):
 
 def test_every_right_hand_side_is_counted():
     _, _, counts = orbit(1e-9)
-    # two to begin with, twelve for each step tried, three for the last step's dense output
+    # two at the start, twelve for each attempted step, and three for the dense output of the last step
     assert counts[RHS] == 2 + 12 * (counts[ACCEPTED] + counts[REJECTED]) + 3
 
 
@@ -228,7 +227,7 @@ def test_budget_ends_the_integration():
 
 
 def test_solution_with_a_singularity_stops_at_the_smallest_step():
-    # two bodies that meet: the satellite starts in the moon's centre
+    # The satellite starts in the centre of the moon.
     method = new_dop853(4, 1e-10, 1e-10, 10**6)
     inside_the_moon = (1.0 - ARENSTORF.moon, 0.0, 0.0, 0.0)
     status = integrate(method, ARENSTORF, np.array(inside_the_moon), 1.0, 0.0, 1.0, np.zeros(4))
@@ -237,7 +236,7 @@ def test_solution_with_a_singularity_stops_at_the_smallest_step():
 
 @kernel
 def there_and_back(method, system, y, h, middle, back):
-    """Take a step, take it back, and take half of it again."""
+    """Take a step, undo it, and take half of it."""
     begin(method, system, 0.0, y, h)
     advance(method, system, 1e9)
     prepare_dense(method, system)
@@ -258,7 +257,7 @@ def test_step_can_be_repeated_up_to_an_event():
 
 
 class Twice(NamedTuple):
-    """The pair twice in one state, which is larger than a block."""
+    """Two copies of the pair in one state, which is larger than a block."""
 
 
 @block.case(Twice)

@@ -69,7 +69,7 @@ def test_touching_zero_without_sign_change_is_not_a_crossing():
 
 
 def test_crossing_at_the_start_is_not_found_twice():
-    # what the event before left behind: zero but for rounding, of either sign
+    # The previous event leaves a value that is zero up to rounding, with either sign.
     for rounding in (0.0, 1e-17, -1e-17):
         event = with_roots(0.0, 1.5) + rounding
         assert crossing(event, zero_at_start=True) == NO_CROSSING
@@ -85,7 +85,7 @@ def test_crossing_right_after_the_start_is_found():
 
 
 def test_crossing_at_the_end_belongs_to_one_step_only():
-    # the value at the step's end is the next step's first value: a sign change lies in one of the two
+    # The last value of a step is the first value of the next step, so a sign change lies in one of the two.
     before, after = with_roots(1.0 - 1e-13), with_roots(-1e-13)
     found = [crossing(before) <= 1.0, crossing(after) <= 1.0]
     assert found == [True, False]
@@ -120,7 +120,7 @@ def test_every_crossing_is_found_in_order(thousandths, sign, direction):
     roots = sorted(number / 1000.0 for number in thousandths)
     event = with_roots(*roots, sign=sign) if roots else Polynomial([sign])
     slopes = [np.sign(event.deriv()(root)) for root in roots]
-    # neighbours at 0.001 make values of 1e-21: leave out what rounding decides
+    # Roots at a distance of 0.001 give values of 1e-21, whose sign may depend on rounding, so skip them.
     assume(all(abs(event.deriv()(root)) > 1e-9 for root in roots))
     wanted = [root for root, slope in zip(roots, slopes, strict=True) if direction in (EITHER, slope)]
     found, after = [], 0.0

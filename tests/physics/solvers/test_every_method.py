@@ -30,7 +30,7 @@ PLENTY = 10**6
 
 
 class Satellite(NamedTuple):
-    """Arenstorf's orbit about earth and moon; Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2)."""
+    """Arenstorf's orbit about earth and moon (Hairer, Norsett, Wanner, section II.0, (0.1) and (0.2))."""
 
     moon: float
 
@@ -104,7 +104,7 @@ def once_more(method, system, t_end):
 
 
 def called(name, function, *arguments):
-    """Call a kernel as walks do: compiled for our own methods, in Python for a library's."""
+    """Call a kernel as walks do: compiled for built-in methods, and in Python for those of a library."""
     return (function if METHODS[name].compiled else function.py_func)(*arguments)
 
 
@@ -115,7 +115,9 @@ def driven(name, rtol, t_end, budget=PLENTY):
 
 @cache
 def growth(t):
-    """Return the largest factor by which a change of the start has grown by a time: 3e3 after a tenth of the orbit."""
+    """Return the largest factor by which a change of the start grows until time t. It is 3e3 after a tenth of the
+    orbit.
+    """
     change = 1e-9
     ends = [drive_to(t, START + sign * change * unit) for unit in np.eye(4) for sign in (1.0, -1.0)]
     columns = [(up - down) / (2.0 * change) for up, down in zip(ends[::2], ends[1::2], strict=True)]
@@ -140,7 +142,7 @@ def allowed(name, rtol, t):
 
 
 def variations(t, z):
-    """Rates of the state and of its derivatives (4, 4) with respect to the start."""
+    """Return the rates of the state and of its derivatives (4, 4) with respect to the start."""
     rates, slopes = np.zeros(4), np.zeros((4, 4))
     satellite_derivative(ORBIT, t, z[:4], rates)
     satellite_jacobian(ORBIT, t, z[:4], slopes)
@@ -169,7 +171,8 @@ def allowed_of_cvode(times, rtol):
     return np.sqrt(squares)
 
 
-# without a moon a circle around the earth, seen from the rotating frame: Kepler's third law gives its rate
+# Without a moon the orbit is a circle around the earth, seen from the rotating frame. Its rate follows from Kepler's
+# third law.
 NO_MOON = Satellite(0.0)
 RADIUS = 0.64
 TURN = RADIUS**-1.5 - 1.0
@@ -181,7 +184,7 @@ def on_circle(t):
 
 
 def circled(name, rtol):
-    """Steps of one turn, and the error of its end."""
+    """Return the number of steps for one turn, and the error at the end."""
     method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
     t_end = 2.0 * math.pi / TURN
     assert called(name, drive, method, NO_MOON, on_circle(0.0), t_end) == STEP_DONE
@@ -199,7 +202,7 @@ every_method = pytest.mark.parametrize("name", METHODS)
 
 @every_method
 def test_arenstorf_orbit_closes_with_every_method(name):
-    """Along the orbit changes of the place grow about 10^4 times, those of the velocity 10^6 times."""
+    """Along the orbit, changes of the position grow by a factor of about 10^4, and those of the velocity by 10^6."""
     if name.startswith("cvode"):
         method = method_named(name).new(4, 1e-9, 1e-11, PLENTY)
         bound = allowed_of_cvode(times_of_steps(method, PERIOD), 1e-9)
@@ -253,7 +256,7 @@ def test_counted_work_rises_with_accuracy(name):
 def test_run_ends_when_its_budget_is_spent(name):
     method, status = driven(name, 1e-8, PERIOD, budget=100)
     assert status == OUT_OF_BUDGET
-    assert method.counts[RHS] <= 130  # a step that has begun may be finished
+    assert method.counts[RHS] <= 130  # A step that has begun may be completed.
 
 
 @every_method
@@ -285,7 +288,9 @@ def test_step_can_be_repeated_up_to_an_event(name):
 
 @every_method
 def test_steps_shortened_by_a_deadline_are_contiguous(name):
-    """Deadlines every few thousandths of the orbit, and each third step taken back halfway, as events do."""
+    """There are deadlines every few thousandths of the orbit, and every third step is repeated up to its middle, as
+    after an event.
+    """
     rtol, t_end = 1e-8, 0.1 * PERIOD
     method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
     called(name, start, method, ORBIT, START)
@@ -303,7 +308,7 @@ def test_steps_shortened_by_a_deadline_are_contiguous(name):
     whole, _ = driven(name, rtol, t_end)
     assert y == pytest.approx(whole.y, abs=allowed(name, rtol, t_end).max())
     if not METHODS[name].compiled:
-        # a library's solver goes its own way: cutting its steps short is no work for it
+        # The solver of a library continues its steps regardless of deadlines, so they cause no additional work.
         assert method.counts[ACCEPTED] == whole.counts[ACCEPTED]
 
 

@@ -1,4 +1,4 @@
-"""Check that code compiled for lanes does in each lane what it does for a float."""
+"""Check that code compiled for lanes computes in each lane what it computes for a float."""
 
 import math
 import subprocess
@@ -81,7 +81,7 @@ print((theirs() - before)["<built-in function add>"])
 def test_importing_lanes_registers_no_global_operators():
     done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 0  # of those that are looked at
+    assert int(done.stdout) > 0  # makes sure that the script looked at some operators
 
 
 def test_lane_arithmetic_equals_float_arithmetic():
@@ -136,7 +136,7 @@ def test_equations_of_motion_in_a_lane_equal_those_of_one_walker():
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3])
-def test_explicit_two_leg_equations_equal_the_rigid_model(radius):
+def test_written_out_equations_of_two_legs_equal_the_rigid_model(radius):
     model = MODEL.changed(radius=radius)
     y = np.random.default_rng(3).uniform(-2.0, 2.0, (4, WIDTH))
     out, expected = np.zeros((4, WIDTH)), np.zeros((4, WIDTH))

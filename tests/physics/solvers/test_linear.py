@@ -1,4 +1,6 @@
-"""Compare LU factors with row exchanges, real and complex, with NumPy. Every Radau test uses them compiled."""
+"""Compare real and complex LU factorisations with row exchanges with NumPy. Every Radau test uses their
+compiled form.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +34,7 @@ def systems(draw):
 def check(A, b):
     x, pivots = b.copy(), np.zeros(b.size, np.int64)
     assert solved(A.copy(), pivots, x)
-    # backward stable: the residual is a few roundings of |A| |x|, however ill-conditioned A
+    # The method is backward stable: the residual is a few roundings of |A| |x|, however ill-conditioned A is.
     size = np.abs(A) @ np.abs(x) + np.abs(b)
     growth = 2.0 ** (b.size - 1)
     assert np.all(np.abs(A @ x - b) <= 1e-14 * b.size * growth * (size.max() + 1e-300))
@@ -50,7 +52,7 @@ def test_solution_satisfies_its_equations(system):
 
 
 def test_rows_are_exchanged_at_a_zero_or_tiny_pivot():
-    """Without exchanges the first divides by zero and the second loses every digit."""
+    """Without exchanges, the first system would divide by zero, and the second would lose every digit."""
     for A in (np.array([[0.0, 1.0], [1.0, 1.0]]), np.array([[1e-20, 1.0], [1.0, 1.0]])):
         b = np.array([1.0, 2.0])
         solved(A.copy(), np.zeros(2, np.int64), b)
@@ -58,7 +60,7 @@ def test_rows_are_exchanged_at_a_zero_or_tiny_pivot():
 
 
 def test_badly_scaled_system_of_a_stiff_step_is_solved():
-    """gamma/h I - J as Radau meets it: one over a tiny step beside a contact stiffness."""
+    """Radau meets such matrices gamma/h I - J if one over a tiny step stands next to a contact stiffness."""
     A = np.diag([3.6e9] * 4) - np.array(
         [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, -1e2, -3.0, 0.0], [0.0, -1e8, 0.0, -4e4]]
     )

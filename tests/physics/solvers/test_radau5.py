@@ -89,7 +89,7 @@ def one_step(z):
 
 @given(size=st.floats(-3.0, 8.0), turn=st.floats(0.5, 1.5))
 def test_stability_function_is_the_pade_approximation(size, turn):
-    """(2, 3) Pade of exp(z), all over the left half-plane."""
+    """Compare with the (2, 3) Pade approximation of exp(z) in the whole left half-plane."""
     z = 10.0**size * complex(math.cos(math.pi * turn), math.sin(math.pi * turn))
     pade = (1 + 2 * z / 5 + z**2 / 20) / (1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60)
     assert one_step(z) == pytest.approx(pade, abs=1e-11)
@@ -97,13 +97,13 @@ def test_stability_function_is_the_pade_approximation(size, turn):
 
 @pytest.mark.parametrize("omega", [0.01, 1.0, 3.0, 30.0, 1e3, 1e6])
 def test_undamped_oscillations_do_not_grow(omega):
-    """A-stable: on the imaginary axis |R| <= 1."""
+    """The method is A-stable: |R| <= 1 on the imaginary axis."""
     assert abs(one_step(1j * omega)) <= 1.0 + 1e-12
 
 
 @pytest.mark.parametrize("z", [-1e4, -1e6, -1e9])
 def test_infinitely_stiff_parts_vanish_within_one_step(z):
-    """L-stable: R falls like 3 / |z|."""
+    """The method is L-stable: R falls like 3 / |z|."""
     assert abs(one_step(complex(z))) == pytest.approx(3.0 / abs(z), rel=1e-2)
 
 
@@ -111,7 +111,7 @@ def test_infinitely_stiff_parts_vanish_within_one_step(z):
 
 
 def fixed_steps(system, y, t_end, h, size):
-    """End of steps of length h; `size` is an error that none of them reaches."""
+    """Return the end after steps of length h. `size` is an error tolerance that no step exceeds."""
     method = new_radau5(2, 2e-10, size, PLENTY)
     assert drive(method, system, 0.0, np.array(y), h, t_end) == STEP_DONE
     assert method.counts[ACCEPTED] == round(t_end / h)
@@ -136,7 +136,7 @@ def test_method_has_order_five_on_a_smooth_nonlinear_problem():
 
 
 def curve_errors(pull):
-    """Prothero and Robinson's problem: y is pulled to (sin t, cos t)."""
+    """Return errors for the problem of Prothero and Robinson, which pulls y to (sin t, cos t)."""
     exact = np.array([math.sin(1.5), math.cos(1.5)])
     system, lengths = Planar(CURVE, pull, 0.0, 1.0), (0.5, 0.25, 0.125, 0.0625)
     return [np.abs(fixed_steps(system, (0.0, 1.0), 1.5, h, 1.0).y - exact).max() for h in lengths]
@@ -147,12 +147,12 @@ def test_mild_attraction_to_a_curve_gives_order_five():
 
 
 def test_stiff_attraction_to_a_curve_is_exact_to_rounding():
-    """Stiffly accurate: the error falls with the stiffness, from the longest step on."""
+    """The method is stiffly accurate: the error falls with the stiffness even for the longest step."""
     assert max(curve_errors(-1e12)) < 1e-13
 
 
 def test_dense_output_is_the_collocation_polynomial_of_order_three():
-    """Local error h^4 between the ends; the ends themselves are met."""
+    """The local error is h^4 between the ends of a step, and zero at the ends."""
     start = np.array([1.5, -0.7])
     assert dense_degree(new_radau5(2, 1e-6, 1e-6, 1)) == 3
     errors = []
@@ -185,7 +185,7 @@ def test_dense_output_is_the_collocation_polynomial_of_order_three():
 def test_van_der_pol_ends_as_published(tol):
     method = integrated(STIFF, (2.0, 0.0), 2.0, tol, tol)
     np.testing.assert_allclose(method.y, VDPOL_END, rtol=20 * tol)
-    assert method.counts[ACCEPTED] < 5000  # an explicit method needs millions
+    assert method.counts[ACCEPTED] < 5000  # An explicit method would need millions of steps.
 
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-8])
@@ -193,7 +193,7 @@ def test_robertsons_reaction_ends_as_published(tol):
     method = integrated(Kinetics(ROBERTSON), ROBERTSON_START, 1e11, tol, 1e-8 * tol)
     np.testing.assert_allclose(method.y[:3], ROBERTSON_END, rtol=20 * tol)
     assert not method.y[3:].any()
-    assert method.y.sum() == pytest.approx(1.0, abs=1e-12)  # mass
+    assert method.y.sum() == pytest.approx(1.0, abs=1e-12)  # The total mass is conserved.
 
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-8])
@@ -233,7 +233,7 @@ def test_errors_fall_with_the_tolerance():
 
 
 def test_analytic_jacobian_of_the_system_is_used():
-    """No Jacobian is differenced: without one, the method could not take large steps."""
+    """The method computes no differences. Without the Jacobian, it could not take large steps."""
     told, untold = (Planar(LINEAR, -1e5, 0.0, part) for part in (1.0, 0.0))
     knowing = integrated(told, (1.0, 0.5), 1.0, 1e-6, 1e-6)
     ignorant = new_radau5(2, 1e-6, 1e-6, PLENTY)
@@ -245,7 +245,8 @@ def test_analytic_jacobian_of_the_system_is_used():
 def test_radau5_counts_its_work():
     method = integrated(STIFF, (2.0, 0.0), 2.0, 1e-6, 1e-6)
     rhs, accepted, jacobians = (int(method.counts[i]) for i in (RHS, ACCEPTED, JACOBIANS))
-    # begin and every accepted step evaluate once, every Newton iteration three times, and a step has at least one
+    # The start and every accepted step evaluate once, and every Newton iteration three times. A step has at least one
+    # iteration.
     assert rhs >= 1 + 4 * accepted
     assert 1 <= jacobians <= accepted + method.counts[REJECTED] + 1
 
@@ -261,7 +262,7 @@ def test_radau5_stops_at_its_budget():
 
 
 def test_steps_that_shrink_to_rounding_end_the_run():
-    """y' = y^2 is infinite at t = 1."""
+    """The solution of y' = y^2 is infinite at t = 1."""
     method = new_radau5(2, 1e-8, 1e-8, PLENTY)
     assert drive(method, Planar(EXPLOSION, 0.0, 0.0, 1.0), 0.0, np.array([1.0, 0.0]), 0.0, 2.0) == STEP_TOO_SMALL
     assert method.clock[T] == pytest.approx(1.0, abs=1e-6)

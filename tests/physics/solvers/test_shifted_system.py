@@ -1,4 +1,4 @@
-"""Compare systems (s I - J) x = r of implicit methods, whole and halved, with NumPy."""
+"""Compare the solutions of systems (s I - J) x = r of implicit methods, in full and in half size, with NumPy."""
 
 from fractions import Fraction
 
@@ -16,7 +16,7 @@ shifts = st.one_of(st.floats(0.1, 1e4), st.builds(complex, st.floats(0.1, 1e4), 
 
 @st.composite
 def motions(draw):
-    """Jacobians of q' = v, v' = f(q, v)."""
+    """Draw Jacobians of q' = v, v' = f(q, v)."""
     half = draw(st.integers(1, 4))
     lower = draw(arrays(float, (half, 2 * half), elements=entries))
     return np.vstack((np.hstack((np.zeros((half, half)), np.eye(half))), lower))
@@ -39,7 +39,7 @@ def test_systems_from_equations_of_motion_are_solved_with_half_as_many_unknowns(
     r = data.draw(arrays(float, n, elements=entries))
     assert unknowns(J) == n // 2
     expected = np.linalg.solve(matrix, r)
-    # x_q = (r_q + x_v) / s: a rounding of r over the shift stays in the positions
+    # Because x_q = (r_q + x_v) / s, the rounding of r over the shift remains in the positions.
     allowed = 1e-13 * np.linalg.cond(matrix) ** 2 * np.abs(expected).max() + 1e-15 * np.abs(r).max() / abs(s) + 1e-300
     for left in (n // 2, n):
         assert np.abs(solved(J, left, s, r) - expected).max() <= allowed
@@ -55,7 +55,7 @@ def test_systems_that_cannot_be_halved_keep_all_their_unknowns(J):
 
 
 def test_stiff_contact_step_is_solved_to_rounding():
-    """A foot on 1e9 N/m with 1e5 N s/m, and a step of a microsecond."""
+    """The foot is on ground of 1e9 N/m and 1e5 N s/m, and the step is a microsecond."""
     J = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-40.0, 3.0, -0.1, 0.0], [2.0, -5e7, 0.0, -5e3]])
     x = np.array([0.1, 1e-6, -2.0, 1e-2])
     for s in (3.6e6, 2.7e6 - 3.1e6j):
@@ -65,12 +65,12 @@ def test_stiff_contact_step_is_solved_to_rounding():
 @pytest.mark.parametrize("damping", [1.0, 1e6, 1e12])
 @pytest.mark.parametrize("shift", [1.0, 1e3, 1e9])
 def test_velocities_keep_their_digits_under_stiff_damping(damping, shift):
-    """They are then far smaller than shift times position, of which no difference may be taken."""
+    """Velocities are then far smaller than shift times position, so they must not be computed as such a difference."""
     J, r = np.array([[0.0, 1.0], [-1e6, -damping]]), np.array([1.0, 1.0])
     s, k, c = Fraction(shift), Fraction(10**6), Fraction(damping)
     determinant = s * (s + c) + k
     exact = np.array([float((s + c + 1) / determinant), float((s - k) / determinant)])
-    # positions keep those that r over the shift has
+    # Positions keep the digits of r over the shift.
     np.testing.assert_array_less(np.abs(solved(J, 1, shift, r) - exact), 1e-14 * np.abs(exact) + [1e-15 / shift, 0.0])
 
 

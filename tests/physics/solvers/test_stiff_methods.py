@@ -18,7 +18,7 @@ from stiff_problems import (
 from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.physics.solvers.stepping import ACCEPTED, STEP_DONE, T, advance, begin
 
-# system, start, time, published end, and absolute tolerance for a relative one of 1
+# system, start, time, published end, and absolute over relative tolerance
 PROBLEMS = {
     "van der Pol, mu = 1e6": (STIFF, (2.0, 0.0), 2.0, VDPOL_END, 1.0),
     "Robertson": (Kinetics(ROBERTSON), ROBERTSON_START, 1e11, ROBERTSON_END, 1e-8),
@@ -39,7 +39,7 @@ def in_python(method, system, start, t_end):
 
 
 def error_of(name, problem, tolerance):
-    """Largest relative error of the end, and the steps it took."""
+    """Return the largest relative error at the end, and the number of steps."""
     system, start, t_end, end, absolute = PROBLEMS[problem]
     method = METHODS[name].new(len(start), tolerance, absolute * tolerance, 10**6)
     if METHODS[name].compiled:
@@ -71,6 +71,6 @@ def test_stiff_method_ends_as_published_in_few_steps(name, problem):
 @each_problem
 @each_method
 def test_error_of_a_stiff_method_falls_with_the_tolerance(name, problem):
-    """It falls by at least half of the digits by which the tolerance falls."""
+    """The error must fall by at least half as many digits as the tolerance."""
     loose, tight = (error_of(name, problem, tolerance)[0] for tolerance in (1e-5, 1e-9))
     assert tight < 1e-2 * loose

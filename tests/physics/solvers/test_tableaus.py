@@ -18,7 +18,7 @@ def square(rows, stages):
 
 
 def collocation(T, real, pair, c):
-    """A and b of a stiffly accurate method whose A^-1 is T diag(real, pair) T^-1."""
+    """Return A and b of a stiffly accurate method whose A^-1 is T diag(real, pair) T^-1."""
     turned = np.array([[real, 0.0, 0.0], [0.0, pair.real, pair.imag], [0.0, -pair.imag, pair.real]])
     A = np.linalg.inv(T @ turned @ np.linalg.inv(T))
     return A, A[-1], np.array(c)
@@ -34,7 +34,7 @@ def own_radau5():
 
 
 def of_scipys_radau():
-    # its pair stands the other way round
+    # This method has its complex pair in the opposite order.
     return collocation(scipy_radau.T, scipy_radau.MU_REAL, np.conj(scipy_radau.MU_COMPLEX), scipy_radau.C)
 
 
@@ -49,7 +49,7 @@ every_tableau = pytest.mark.parametrize("name", TABLEAUS)
 
 
 def test_every_one_step_method_has_its_tableau_checked():
-    """The others are multistep methods, which vary their order."""
+    """The remaining methods are multistep methods, which vary their order."""
     assert set(TABLEAUS) == {name for name, method in METHODS.items() if method.orders[0] == method.orders[1]}
 
 
@@ -61,7 +61,7 @@ def test_stage_times_equal_the_row_sums(name):
 
 @every_tableau
 def test_every_condition_of_the_order_is_met(name):
-    """Coefficients have 16 digits, and products of them grow to some tens."""
+    """Coefficients have 16 digits, and their products can be as large as some tens."""
     A, b, _ = TABLEAUS[name]()
     for order in range(1, METHODS[name].orders[1] + 1):
         assert defects(A, b, order) == pytest.approx([0.0] * len(trees(order)), abs=1e-14)

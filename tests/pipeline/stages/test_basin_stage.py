@@ -1,4 +1,6 @@
-"""Tests of the stage `basin`: shares, interrupted runs, processes, the contact model, and rejected questions."""
+"""Tests of the stage `basin`: shares of walks, interrupted runs, processes, the contact model, and rejected
+requests.
+"""
 
 from pathlib import Path
 
@@ -27,7 +29,7 @@ SMALL = ("basin.cells=[16,12]", "basin.lower=[0.12,-1.2]", "basin.upper=[0.24,-0
 
 
 class CutOff(Silent):
-    """A progress that interrupts the run after some calls of `advance`."""
+    """A progress display that interrupts the run after some calls of `advance`."""
 
     def __init__(self, left):
         self.left = left
@@ -44,7 +46,7 @@ def run(folder, *sets, progress=None, jobs=1, **gait):
     checkpoint = Checkpoint(folder / "basin.parts", "key")
     inputs = {"fixedpoint": Content({}, GAIT | gait)}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(basin, "SEARCHED_STARTS", 300)  # one attractor is found soon
+        patch.setattr(basin, "SEARCHED_STARTS", 300)  # Few starts suffice, because there is only one attractor.
         return basin.run(config, inputs, progress or Silent(), checkpoint=checkpoint, jobs=jobs)
 
 
@@ -72,7 +74,7 @@ def test_summary_counts_agree_with_the_grid(whole):
     assert 0.0 < summary["margin"] < 0.1
     again = summary["numerical_error"]
     assert (again["walked_again"], again["of"]) == (100, 16 * 12)
-    # of cells at edges the smallest error decides
+    # For cells at edges, the smallest error decides.
     assert again["ended_otherwise"] <= 5
     ended = {row["outcome"]: row["walks"] for row in summary["endings"]}
     assert ended == {name: many for name, many in summary["outcomes"].items() if name != "walked"}
@@ -201,7 +203,7 @@ def test_basin_of_nearly_equal_legs_equals_that_of_equal_legs(whole, tmp_path):
     assert row["cells"] == equal["cells"]
     assert content.summary["outcomes"] == whole.summary["outcomes"]
     assert content.summary["numerical_error"]["ended_otherwise"] == 0
-    # settling is looked for once a stride
+    # The search for a settled walk checks once per stride.
     steps, steps_of_equal = (each.groups["basin"]["steps_to_settle"] for each in (content, whole))
     assert np.isin(steps - steps_of_equal, [0, 1]).all()
 

@@ -1,4 +1,4 @@
-"""Tests of the stage `contact-sim`: its results, and its messages without a walk on compliant ground."""
+"""Tests of the stage `contact-sim`: its results, and its messages if there is no walk on compliant ground."""
 
 import json
 import math
@@ -22,7 +22,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.provenance import begin
 from walkerlab.scene import contact
 
-# design contract, section 4
+# keys that programs may rely on
 FIXED_KEYS = {
     "outcome",
     "steps",
@@ -37,7 +37,8 @@ FIXED_KEYS = {
     "work_per_step_J",
     "cost_of_transport",
 }
-# a result of fixedpoint, as far as contact-sim reads it: the corrected gait of the paper's slope
+# the part of a result of `fixedpoint` that `contact-sim` reads: the gait of the corrected equations on the paper's
+# slope
 GAIT = Content({}, {"state": [-0.204200, 0.169400, -0.605819, -0.861041], "step_length_m": 0.3714303})
 SLOPE, RADIUS, WEIGHT = 0.0174, 0.001, 20.0 * 9.81
 SHARED = {
@@ -94,7 +95,7 @@ def test_every_touch_is_on_a_pad_of_its_leg(paper):
 
 
 def masses(trajectory):
-    """(mass, along, height) of legs and hip, from the hip and the angles alone."""
+    """Return (mass, position along the slope, height) of legs and hip, computed from the hip and the angles."""
     hip = np.array([trajectory["hip_along_m"], trajectory["hip_height_m"]])
     yield 10.0, *hip
     for leg in range(2):
@@ -116,7 +117,7 @@ def test_velocities_are_the_rates_of_the_angles(paper):
     trajectory = paper["trajectory"]
     time, angle, velocity = trajectory["time"], trajectory["angle"], trajectory["velocity"]
     mean = 0.5 * (velocity[1:] + velocity[:-1])
-    # a touch shortens one interval's mean by a jump of the velocity
+    # In the interval with a touch, the velocity jumps, so the mean rate differs.
     off = np.abs(np.diff(angle, axis=0) / np.diff(time)[:, None] - mean)
     assert np.median(off) < 1e-4
     assert off.max() < 2.0
@@ -131,7 +132,7 @@ def test_potential_energy_is_measured_from_the_foothold(paper):
     )
     np.testing.assert_allclose(trajectory["potential_J"], expected, rtol=1e-12)
     elastic = trajectory["mechanical_J"] - trajectory["kinetic_J"] - trajectory["potential_J"]
-    # k d^(e + 1) / (e + 1) = F d / (e + 1) of the foot that stands at rest
+    # elastic energy k d^(e + 1) / (e + 1) = F d / (e + 1) of the foot that stands at rest
     weight, depth = 20 * 9.81 * math.cos(SLOPE), np.median(trajectory["penetration_m"].max(axis=1))
     assert np.median(elastic) == pytest.approx(weight * depth / 3.2, rel=0.05)
     assert np.median(trajectory["mechanical_J"]) == pytest.approx(150.2, abs=0.5)
@@ -153,7 +154,8 @@ def test_energy_balances_at_every_sample_and_losses_only_grow(paper):
         assert np.diff(trajectory[name]).min() >= -1e-9
     book = trajectory["total_energy_J"]
     np.testing.assert_allclose(trajectory["residual_J"], book + lost - book[0], atol=1e-12)
-    assert np.abs(trajectory["residual_J"]).max() < 1e-4  # read between the solver's steps
+    # The samples lie between solver steps, so they are less accurate.
+    assert np.abs(trajectory["residual_J"]).max() < 1e-4
     total = paper.summary["dissipated_J"]
     assert sum(total.values()) == pytest.approx(lost[-1], abs=0.05)
 
@@ -227,7 +229,9 @@ def test_straight_legs_that_scuff_on_a_plane_get_advice():
 
 
 def test_massless_hip_is_the_limit_of_a_tiny_hip_mass():
-    """At the instant at which the feet pass, an event of this terrain, no mass resists a motion of the hip alone."""
+    """On this terrain the passing of the feet is an event. At that instant no mass resists a motion of the hip
+    alone.
+    """
     asked = "start=[-0.126905, 0.092105, -1.065008, -1.176315]", "contact.terrain=after-mid-swing", "strides=1"
     none, little = (run(f"walker.hip_mass_kg={mass}", *asked, "outputs=[]", inputs=()) for mass in (0, 1e-5))
     assert none.summary["outcome"] == little.summary["outcome"] == "walked"
@@ -236,7 +240,7 @@ def test_massless_hip_is_the_limit_of_a_tiny_hip_mass():
 
 
 def test_walk_from_a_given_start_needs_a_gait_only_for_its_pads():
-    """The step that pads and steps are measured by is then that of the start itself."""
+    """Without a gait, the length by which pads and steps are judged is that of the first step from the start."""
     content = run("start=[-0.2042, 0.1694, -0.6, -0.86]", "contact.pad_pitch=0.3714", "outputs=[]", inputs=())
     assert content.summary["outcome"] == "walked"
     assert content.summary["pitch_m"] == 0.3714
@@ -260,7 +264,7 @@ def test_exhausted_budget_gives_no_answer_but_keeps_the_partial_walk(monkeypatch
 
 def test_step_without_a_foot_lift_has_no_slip_value(monkeypatch):
     whole = run("strides=1")
-    # ten more right-hand sides than to the last touch, of hundreds to the lift
+    # This is enough for the last touch, but the lift would take hundreds of right-hand sides more.
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", whole.summary["rhs_evaluations"] // 2 + 5)
     cut = run("strides=1")
     first = whole.summary["slips_m"][0]
@@ -272,7 +276,7 @@ def test_step_without_a_foot_lift_has_no_slip_value(monkeypatch):
 
 
 def test_energy_balances_when_a_pinned_walker_scuffs_and_falls():
-    """The rigid gait on 3 degrees: pulled down by its scuffing foot it falls before its first step."""
+    """From the rigid gait on 3 degrees, the scuffing foot pulls the walker down before the first step."""
     gait = Content({}, {"state": [-0.3233886, 0.2186688, -0.3773739, -1.0923836], "step_length_m": 0.5354454})
     scuffing = ("contact.stance=pinned", "contact.terrain=plane", "slope_deg=3")
     content = run(*scuffing, inputs=(("fixedpoint", gait),))
@@ -306,11 +310,12 @@ def test_pinned_first_step_lists_its_omissions():
     content = run("contact.stance=pinned", "solver.contact.method=scipy-radau", "strides=1")
     assert content.summary["outcome"] == "walked"
     assert any("pinned" in entry["why"] for entry in content.summary["left_out"])
-    # legs shorter by the radius turn over the ball's centre: a little faster than the rigid walker's 0.7036 s
+    # The legs turn about the centre of the ball and are shorter by the radius, so the step is a little faster than the
+    # 0.7036 s of the rigid walker.
     assert content.summary["step_periods_s"][0] == pytest.approx(0.7036, abs=1e-3)
     first = content["trajectory"]["time"] < 0.5
     stance_force = content["trajectory"]["normal_force_N"][first, 1]
-    assert stance_force.max() < 1e-9  # the hinge carries it, not the ground
+    assert stance_force.max() < 1e-9  # The hinge carries the walker, not the ground.
 
 
 def test_equal_configs_give_bitwise_equal_results(paper):
@@ -326,13 +331,13 @@ def test_mid_step_start_continues_the_whole_walk():
     late = simulate_from([0.0, 0.0, 2.0, -0.4], 0.3, 0.0525)
     end = run(f"start={{instant: mid-step, state: {late}}}", *slope, inputs=()).summary
     assert (middle["outcome"], end["outcome"]) == ("walked", "walked")
-    # between both starts the feet sink and slip a little, which the rigid walk does not
+    # Between the two starts the feet sink in and slip a little, unlike in the rigid walk.
     assert end["touch_times_s"][0] + 0.3 == pytest.approx(middle["touch_times_s"][0], abs=0.003)
     assert end["step_lengths_m"][0] == pytest.approx(middle["step_lengths_m"][0], abs=0.005)
 
 
 def simulate_from(state, time_s, slope_rad):
-    """State of the rigid walk from a state, some time later in its first step."""
+    """Simulate a rigid walk from a state, and return the state at a later time in its first step."""
     config = load(None, [f"slope_rad={slope_rad}", f"start={{instant: mid-step, state: {state}}}"]).config
     walk = simulate.run(restrict(config, PIPELINE["simulate"].takes), {}, Silent()).groups["trajectory"].variables
     place = int(np.searchsorted(walk["time"].values, time_s))

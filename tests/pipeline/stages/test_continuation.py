@@ -1,4 +1,4 @@
-"""Tests of the stage `continuation`: its results, their units, and the questions that it rejects."""
+"""Tests of the stage `continuation`: its results, their units, and the requests that it rejects."""
 
 import math
 import re
@@ -73,7 +73,7 @@ def test_gait_without_neighbours_is_reported_but_is_no_branch():
         assert [end["reason"] for end in branch["ends"]] == ["end of the span"] * 2
     (alone,) = [one for one in summary["left_out"] if "continues in neither direction" in one["why"]]
     assert alone["what"].startswith("a gait of the rigid model at 20 N m/rad")
-    assert alone["why"].endswith("Newton's method finds no further gait")  # not that there is no walker
+    assert alone["why"].endswith("Newton's method finds no further gait")  # The reason is not that there is no walker.
 
 
 def test_artifact_has_a_group_for_each_branch(in_degrees):
@@ -95,7 +95,7 @@ def test_number_of_recomputed_gaits_is_reported(in_degrees):
     error = in_degrees.summary["numerical_error"]["rigid"]
     assert (error["walked_again"], error["ended_otherwise"]) == (16, 0)
     assert error["of"] == sum(branch["points"] for branch in in_degrees.summary["branches"])
-    # steps are integrated at 1e-13, of which a gait that is unstable makes more
+    # Steps are integrated at 1e-13, and an unstable gait magnifies this error.
     assert 0.0 < error["step_period_s"] < 1e-11
     assert 0.0 < error["step_length_m"] < 1e-11
     assert error["by"] == "ten times tighter tolerances"
@@ -110,7 +110,9 @@ def test_families_without_error_estimate_are_otherwise_equal():
 
 
 def test_newton_residual_is_part_of_the_numerical_error():
-    """A gait whose start is off: its own step has another period than the gait, whatever the tolerances."""
+    """If the start of a gait is slightly off, its step has another period than the gait, however tight the tolerances
+    are.
+    """
     step_map = rigid_map(config(), parameter_of("slope_deg", config()), 1.0)
     gait = gait_near(step_map, np.array([0.22, -0.12, -0.35]), 3.0, Effort(1e-13))
     z = gait.z + np.array([1e-8, 0.0, 0.0])
@@ -168,7 +170,7 @@ def flip_at(value):
 
 
 def test_unsettled_walks_in_a_cascade_are_not_called_aperiodic():
-    # flips of the contact model; walks just beyond a flip take long to settle
+    # These are flips of the contact model. Walks just beyond a flip take long to settle.
     flips, ranges = (4.097, 4.632, 4.734), ((0.2, 4.097), (4.097, 4.632), (4.632, 4.734))
     branches = [
         SimpleNamespace(period=2**k, stable_ranges=(ranges[k],), bifurcations=(flip_at(flips[k]),), ends=(born,))
@@ -177,7 +179,7 @@ def test_unsettled_walks_in_a_cascade_are_not_called_aperiodic():
     seen = [SimpleNamespace(value=value, period=0) for value in (4.647, 4.74, 4.755, 4.76, 4.9)]
     attractors = SimpleNamespace(found=seen, lost_at=None, reason="")
     followed = SimpleNamespace(model="contact", branches=branches, attractors=attractors, exponents=())
-    # the flips accumulate at 4.734 + 0.102 / (0.535 / 0.102 - 1) = 4.758
+    # The flips accumulate at 4.734 + 0.102 / (0.535 / 0.102 - 1) = 4.758.
     assert attractor_summary(followed)["aperiodic_from"] == 4.76
 
 
@@ -202,7 +204,8 @@ def test_doubled_branch_lists_the_flip_in_its_own_step_order():
 
 
 def test_flip_curve_passes_through_the_flip_of_the_config(monkeypatch):
-    monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (2, 2))  # the plane beside them is not looked at
+    # This test needs no map of the plane next to the curves.
+    monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (2, 2))
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
         "second.over=walker.hip_mass_kg", "second.from=9.5", "second.to=10.5",
@@ -233,10 +236,10 @@ def test_unit_of_a_contact_key_is_that_of_the_config(name, unit):
     assert parameter_of("walker.hip_mass_kg", config).unit == "kg"
 
 
-def test_derived_values_follow_their_key():
+def test_values_derived_from_a_key_change_with_it():
     own = config("walker={leg_length_m: 1.0}")
     longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
-    assert longer.walker.foot_to_mass_m == 0.7  # half of the length, unless it is given
+    assert longer.walker.foot_to_mass_m == 0.7  # The default is half of the length.
     given = config("walker.foot_to_mass_m=0.5")
     assert parameter_of("walker.leg_length_m", given).config_at(given, 1.4).walker.foot_to_mass_m == 0.5
     assert parameter_of("walker.leg_length_m", given).config_at(given, -1.0) is None
@@ -286,7 +289,7 @@ def test_invalid_questions_are_rejected(sets, said):
 
 
 def follow_coarsely(*sets):
-    """Follow the attractor at fewer values, and only gaits of 1, 2 and 4 steps."""
+    """Follow the attractor at fewer values than usual, and only gaits of 1, 2 and 4 steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(THOROUGHNESS, "rigid", replace(THOROUGHNESS["rigid"], values=36, exponents=12, averaged=400))
         patch.setattr(family_search, "OTHER_PERIODS", ())
@@ -310,7 +313,7 @@ def test_span_starting_beyond_the_first_flip_finds_the_same_flips(beyond_the_fir
 
 def test_span_starting_beyond_the_first_flip_finds_chaos(beyond_the_first_flip):
     (attractor,) = beyond_the_first_flip["attractors"]
-    # the cascade's flips accumulate at 5.03922 deg, and walks are looked at every 0.01
+    # The flips of the cascade accumulate at 5.03922 deg, and walks are simulated every 0.01 deg.
     assert 5.0392 < attractor["aperiodic_from"] < 5.06
     assert attractor["from"] == 4.9
     steepest = max(beyond_the_first_flip["lyapunov"], key=lambda one: one["value"])
@@ -326,7 +329,7 @@ def test_gaits_with_fewer_steps_than_the_attractor_are_found(least, settled):
 
 
 def test_attractor_at_the_end_of_a_span_is_followed_downwards():
-    # on this slope the lighter the legs are the further the cascade has gone, until walks fall
+    # On this slope, lighter legs are further along the cascade, until walks fall.
     said = follow_coarsely("over=walker.leg_mass_kg", "slope_deg=5.1", "from=3.8", "to=7")
     assert {one["period"] for one in said["branches"]} >= {1, 2}
     (attractor,) = said["attractors"]
@@ -355,7 +358,7 @@ def test_stored_motion_of_rigid_gaits_is_periodic(in_degrees):
     for path, group in moving.items():
         branch, place = in_degrees[path.rpartition("/")[0]], int(path.rpartition("_")[2])
         assert group.attrs["value"] == branch["value"][place]
-        # a stride of one gait of one step twice, or of a gait of two steps once; unstable ones drift by a little
+        # The motion is two steps: a one-step gait twice, or a two-step gait once. Unstable gaits drift slightly.
         assert group["angle"][-1] == pytest.approx(group["angle"][0], abs=1e-5)
         way = 2 / branch["step_length"].shape[1] * branch["step_length"][place].sum()
         ends = group["foot_along_m"][[0, -1]]

@@ -1,4 +1,4 @@
-"""Tests of the stage `design`: optima compared with grids, bounds, rejected questions, and the config written."""
+"""Tests of the stage `design`: optima compared with grids, bounds, rejected requests, and the config that it writes."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import find_model_gait
 from walkerlab.views.report.answers import answer
 
-# design contract, section 4
+# keys that programs may rely on
 FIXED_KEYS = {
     "best", "value", "start_value", "quantity", "constraints", "gradient_norm", "evaluations",
 }  # fmt: skip
@@ -46,7 +46,7 @@ def gait_at(name, *changes):
 
 
 def test_optimum_equals_that_of_a_grid_search():
-    """The least spectral radius over the hip's mass, on a grid of 46 walkers."""
+    """Compare with the smallest spectral radius on a grid of 46 hip masses."""
     found = run(
         "slope-3deg", "design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=3"
     )
@@ -62,7 +62,9 @@ def test_optimum_equals_that_of_a_grid_search():
 
 
 def test_design_search_uses_the_gait_at_its_own_parameters():
-    """From a hip of 10 kg Newton's method comes to an unstable gait of the walker of 50 kg, with multiplier 4.55."""
+    """From the gait with a hip of 10 kg, Newton's method would find an unstable gait of the walker of 50 kg, with
+    multiplier 4.55.
+    """
     asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [49.9, 50]}", "design.starts=1")
     found = run("slope-3deg", *asked)
     assert found["value"] == pytest.approx(gait_at("slope-3deg", "walker.hip_mass_kg=50").spectral_radius, rel=1e-3)
@@ -73,7 +75,7 @@ def test_interrupted_design_searches_resume(tmp_path):
     whole = run("slope-3deg", *asked, checkpoint=Checkpoint(tmp_path / "parts", "key"))
     kept = Checkpoint(tmp_path / "parts", "key")
     assert list(kept.kept) == ["search 0", "search 1"]
-    del kept.kept["search 1"]  # cut off while it was at work
+    del kept.kept["search 1"]  # The search was interrupted before it had finished.
     again = run("slope-3deg", *asked, checkpoint=kept)
     for name in ("evaluations", "without_gait", "optima", "on_bound", "best"):
         assert again[name] == whole[name]
@@ -103,7 +105,7 @@ def test_random_starts_agree_on_one_optimum():
 
 
 def bowls(x):
-    """Two bowls, the deeper one at 0.8, with no values between 0.4 and 0.6."""
+    """Return a function with two minima, the deeper one at 0.8, and no values between 0.4 and 0.6."""
     u = float(x[0])
     if 0.4 < u < 0.6:
         return None
@@ -142,7 +144,7 @@ def test_invalid_questions_are_rejected(changes, said):
 
 
 def test_values_that_the_config_rejects_have_no_gait():
-    """A leg's mass lies on the leg."""
+    """The mass of a leg cannot lie beyond the leg."""
     over = "design.over={walker.leg_length_m: [0.6, 1.1], walker.foot_to_mass_m: [0.3, 0.9]}"
     found = run("rigid-only", "design.minimise=period_s", over, "design.starts=2")
     assert 0 < found["without_gait"] < found["evaluations"]
@@ -150,7 +152,7 @@ def test_values_that_the_config_rejects_have_no_gait():
 
 @pytest.mark.parametrize("key", ["contact.damping", "push_off.duration_s"])
 def test_parameter_that_the_model_does_not_use_is_rejected(key):
-    """Every value of it is as good as any other."""
+    """Every value would be as good as any other."""
     with pytest.raises(ConfigError, match=f"{key} does not affect the rigid model"):
         run("paper", "design.minimise=period_s", f"design.over={{{key}: [1, 2]}}")
 
@@ -165,7 +167,7 @@ def test_impossible_bounds_give_no_answer():
 
 
 def contact_gait(name):
-    """Return a contact gait's step, and its cost of transport as `design` computes it."""
+    """Return the step of a contact gait, and the cost of transport that `design` computes for it."""
     config = load(Path(name), ["contact.terrain=after-mid-swing"]).config
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
@@ -239,7 +241,7 @@ def test_loss_of_robustness_at_the_optimum_is_reported():
 
 
 def test_design_of_the_mass_of_one_leg_can_start_from_equal_legs():
-    """The longest mean step on a grid of 17 walkers, whose legs are equal in the middle."""
+    """Compare with the longest mean step on a grid of 17 walkers. The legs of the middle one are equal."""
     key = "walker.leg_2.leg_mass_kg"
     found = run("slope-3deg", "design.maximise=period_s", f"design.over={{{key}: [4.8, 5.2]}}", "design.starts=1")
     masses = np.linspace(4.8, 5.2, 17)

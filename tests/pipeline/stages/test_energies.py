@@ -1,4 +1,4 @@
-"""Check that energies of both models have the same zero: where the stance foot touched in each step."""
+"""Check that energies of both models are measured from the same height: that of the stance foothold of each step."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ MODULES = {"fixedpoint": fixedpoint, "simulate": simulate, "contact-sim": contac
 ARC_FOOTED = (
     "walker={type: straight-legs, leg_length_m: 1, leg_mass_kg: 1, leg_mass_below_hip_m: 0.5, foot_radius_m: 0.3}"
 )
-POINTS = "walker.foot_radius_m=0"  # of a compass the rigid model has points in any case
+POINTS = "walker.foot_radius_m=0"  # The rigid model of a compass has point feet anyway.
 WALKERS = {
     "paper": (POINTS,),
     "torso": (POINTS,),

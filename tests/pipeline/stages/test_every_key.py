@@ -1,4 +1,4 @@
-"""Check that each stage that takes a key follows every number of every built-in walker, or explains why not."""
+"""Check that each stage that takes a key accepts every parameter of every built-in walker, or explains why not."""
 
 from dataclasses import replace
 from fnmatch import fnmatch
@@ -27,7 +27,7 @@ from walkerlab.pipeline.sweeps.question import axis, described
 from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
 
 WALKERS = {
-    # most questions refuse walkers whose legs differ
+    # Most requests are refused for walkers whose legs differ.
     **dict.fromkeys(sorted({*builtin_names()} - {"one-knee", "prosthesis"}), ()),
     "kneed with compliant stops": ("walker.knee.lock=compliant",),
     "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
@@ -52,11 +52,11 @@ REFUSED = (
     ("gradients", ("kuo",), "walker.hip.[dt]*", ""),
     ("gradients", ("simplest",), "walker.hip.*", ""),
 )
-"""Whatever may be refused: by which question, of which walkers, which keys, and in which words, where there are any."""
+"""Refusals that are expected: the kind of request, the walkers, the keys, and words of the message, if any."""
 
 
 def may_be_refused(question, walker, key, said=""):
-    """Whether a refusal is one of those that are known."""
+    """Whether a refusal is one of the expected ones."""
     return any(
         fnmatch(question, asked) and walker in walkers and fnmatch(key, keys) and (words in said or not said)
         for asked, walkers, keys, words in REFUSED
@@ -87,7 +87,9 @@ def keys(config):
 
 
 def question(config, key, model):
-    """Return a question for `continuation` over a small span above the key's value, or below it at the largest one."""
+    """Return a request for `continuation` over a small span above the value of the key, or below it if the value is at
+    the upper bound.
+    """
     taken = restrict(config, PIPELINE["continuation"].takes)
     taken.continuation = config.continuation.model_copy(update={"model": model})
     parameter = parameter_of(key, taken)
@@ -99,7 +101,7 @@ def question(config, key, model):
 
 
 def followed(asked):
-    """Return the models that are followed, or the reason why there are none."""
+    """Return the models whose gaits were followed, or the reason why there are none."""
     try:
         return models_of(asked), ""
     except ConfigError as error:
@@ -136,7 +138,7 @@ def fixedpoint(config):
 
 @pytest.fixture(scope="module")
 def subject(config, fixedpoint):
-    """Return the rigid model's gait as the subject of disturbances."""
+    """Return the gait of the rigid model in the form that disturbances are applied to."""
     taken = restrict(config, PIPELINE["robustness"].takes)
     return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
 
@@ -160,7 +162,7 @@ ALL_BUT_THE_RIGID_MODEL = {"name", "source", "strides", "ground", "contact", "re
 
 @pytest.fixture(scope="module")
 def known():
-    """Return gradients by everything that the rigid model reads, and by key."""
+    """Return an empty cache of gradients, by the keys that the rigid model reads and by parameter."""
     return {}
 
 

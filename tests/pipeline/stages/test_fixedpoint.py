@@ -14,7 +14,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint
 
-# design contract, section 4
+# keys that programs may rely on
 FIXED_KEYS = {
     "state",
     "period_s",

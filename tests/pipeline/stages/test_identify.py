@@ -1,4 +1,4 @@
-"""Tests of the stage `identify`: recovered parameters, recognised misfits, and rejected questions."""
+"""Tests of the stage `identify`: recovered parameters, recognised misfits, and rejected requests."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ from walkerlab.views.report.blocks import Player, Results
 from walkerlab.views.report.sections.identification import section
 from walkerlab.views.report.tables import Table
 
-# fixed by the interface of `--json`; `config` is the command line's
+# The interface of `--json` fixes these keys. The command line adds `config`.
 FIXED_KEYS = {
     "estimates", "not_identifiable", "correlations", "singular_values", "steps", "rms_residual", "chi_square_per_dof",
     "noise", "gait", "models",
@@ -50,7 +50,7 @@ def transient(gait):
 
 @pytest.fixture(scope="module")
 def table(transient, tmp_path_factory):
-    """The steps of a transient with noise of 1 ms and 1 mm."""
+    """Write the steps of a transient with noise of 1 ms and 1 mm."""
     rng, steps = np.random.default_rng(4), transient.groups["steps"]
     values = np.column_stack((steps["period_s"], steps["length_m"]))
     path = tmp_path_factory.mktemp("walk") / "steps.csv"
@@ -137,7 +137,7 @@ def test_known_leg_mass_determines_the_hip_mass(table, gait):
     changes = ask(table, fit, "identify.prior={walker.leg_mass_kg: [5, 0.05]}")
     rows = {row["key"]: row for row in identify.run(taken(*changes), gait, Silent()).summary["estimates"]}
     assert rows["walker.leg_mass_kg"]["standard_error"] == pytest.approx(0.05, rel=0.02)
-    # hip over leg is known far better than the leg: the hip inherits its relative error
+    # The ratio of hip and leg is known far better than the leg, so the hip has the relative error of the leg.
     assert rows["walker.hip_mass_kg"]["standard_error"] == pytest.approx(0.1, rel=0.1)
 
 
@@ -175,7 +175,7 @@ def test_changing_the_file_changes_the_result_key(tmp_path):
 def test_sampled_angles_are_divided_at_their_heel_strikes(transient, tmp_path):
     samples = transient.groups["trajectory"]
     time, angle, path = samples["time"], samples["angle"], tmp_path / "angles.csv"
-    # rounding decides whether the touch with which the walk ends is in the data, so its step is left out
+    # Rounding decides whether the last touch is in the data, so leave out its step.
     touches = transient.groups["steps"]["touch_time_s"]
     rising = np.append(True, np.diff(time) > 0.0) & (time < 0.5 * (touches[-2] + touches[-1]))
     lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
@@ -224,7 +224,7 @@ DAMAGED_FILES = [
 
 
 def refused(folder, monkeypatch, *options):
-    """Run the command in the folder, and return its messages; it must refuse and leave nothing behind."""
+    """Run the command in the folder, check that it refuses and leaves no files, and return its messages."""
     monkeypatch.chdir(folder)
     done = CliRunner().invoke(program(), ["identify", *options])
     assert done.exit_code in (2, 3), (done.output, done.exception)
@@ -325,7 +325,7 @@ def test_table_of_periods_alone_is_read(tmp_path):
 
 
 def test_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
-    """Lengths that repeat to the last digit leave no noise of their own, so any noise of the periods would fit."""
+    """If all lengths are equal to the last digit, they show no noise, so that any noise of the periods would fit."""
     path = tmp_path / "table.csv"
     path.write_text("period_s,length_m\n" + "".join(f"{(0.59, 0.77)[k % 2]},0.0171\n" for k in range(10)))
     fit = "identify.fit={slope_deg: [0.1, 6], walker.leg_length_m: [0.6, 2]}"
@@ -337,7 +337,7 @@ def test_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
 
 @pytest.fixture(scope="module")
 def from_angles(transient, gait, tmp_path_factory):
-    """The walker identified from angles of the transient."""
+    """Identify the walker from angles of the transient."""
     samples, path = transient.groups["trajectory"], tmp_path_factory.mktemp("film") / "angles.csv"
     time, angle = samples["time"], samples["angle"]
     rising = np.append(True, np.diff(time) > 0.0) & (time < 4.0)
@@ -348,7 +348,7 @@ def from_angles(transient, gait, tmp_path_factory):
 
 
 def written_angles(path, transient, offset):
-    """Write angles of the transient's first 4 s at 100 Hz, off by an offset and with noise."""
+    """Write angles of the first 4 s of the transient at 100 Hz, with an offset and noise."""
     samples, time = transient.groups["trajectory"], np.arange(0.0, 4.0, 0.01)
     noise = 1e-3 * np.random.default_rng(8).standard_normal((time.size, 2))
     angle = np.column_stack([np.interp(time, samples["time"], leg) for leg in samples["angle"].T]) + noise + offset
@@ -381,7 +381,7 @@ def test_sensitivity_of_the_identified_gait_has_an_error(table, gait):
     fit = "identify.fit={slope_deg: null}"
     summary = identify.run(taken(*ask(table, fit, "identify.robustness=true")), gait, Silent()).summary
     norm = summary["gait"]["drop_sensitivity_s_m"]
-    # the norm of the config's own gait, from `walkerlab robustness`
+    # norm of the gait of the config, from `walkerlab robustness`
     assert abs(norm["value"] - 25.271) < 4.0 * norm["standard_error"] < 5.0
     assert "a sensitivity norm (period for a drop of the floor) of 25" in " ".join(answer("identify", summary))
 
@@ -426,7 +426,7 @@ def test_identification_from_steps_alone_has_no_player(identified):
 
 def test_worst_combinations_reproduce_the_covariance(identified):
     moves = identified.groups["worst"]["moves"]
-    # of two parameters, both combinations are the whole covariance
+    # With two parameters, both combinations together give the whole covariance.
     assert np.allclose(moves.T @ moves, identified.groups["covariance"]["covariance"], rtol=1e-9)
 
 
@@ -450,7 +450,7 @@ def test_angles_in_degrees_are_rounded_to_their_last_digit(tmp_path, transient):
 
 
 class Counting(Silent):
-    """Progress that counts the parts of each phase."""
+    """Progress display that counts the parts of each phase."""
 
     def __init__(self):
         self.phases = []

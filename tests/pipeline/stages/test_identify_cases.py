@@ -35,7 +35,9 @@ def numbers_in(sentence):
 
 
 def stated_like(sentence):
-    """Yield the numbers of the page's sentences with the same words: rounding decides where a hopeless search ends."""
+    """Yield the numbers of each sentence on the page that has the same words. They may differ from the answer, because
+    rounding decides where a hopeless search ends.
+    """
     words = f"({NUMBER})".join(re.escape(part) for part in re.split(NUMBER, sentence))
     return ([float(number) for number in match.groups()] for match in re.finditer(words, PAGE))
 

@@ -1,4 +1,4 @@
-"""Check that the unit in a name is the unit in the label."""
+"""Check that the unit suffix of a name agrees with the unit in its label."""
 
 import pytest
 

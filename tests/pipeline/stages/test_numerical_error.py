@@ -1,4 +1,4 @@
-"""Tests of a walk's numerical error, which tighter tolerances show, and of the messages if it is unknown."""
+"""Tests of the numerical error of a walk, found at tighter tolerances, and of the messages if it is unknown."""
 
 import pytest
 from annotated_types import Ge
@@ -15,7 +15,7 @@ from walkerlab.pipeline.stages import contact_sim, simulate
 from walkerlab.pipeline.stages.walk import MIN_RTOL, change, tightened
 from walkerlab.pipeline.store.content import Content
 
-# corrected equations, 0.0174 rad (fixed point of the paper's walker)
+# fixed point of the paper's walker by the corrected equations at 0.0174 rad
 STATE = [-0.2042, 0.1694, -0.605819, -0.861041]
 GAIT = Content({}, {"state": STATE, "step_length_m": 0.3714})
 MODULES = {"simulate": simulate, "contact-sim": contact_sim}
@@ -40,9 +40,9 @@ def test_error_estimate_agrees_with_a_far_tighter_walk(stage, model, keys):
     assert list(error) == [*keys, "end_time_s", "of_steps"]
     assert list(error["of_steps"]) == list(keys)
     for key, of in keys.items():
-        assert max(error["of_steps"][key]) == pytest.approx(error[key], rel=0.05)  # two digits
+        assert max(error["of_steps"][key]) == pytest.approx(error[key], rel=0.05)  # Two digits are stored.
         true = max(abs(a - b) for a, b in zip(loose[of], right[of], strict=True))
-        # what the second walk leaves of the first one's error, at an order of five or more: some 2 % of it
+        # At an order of five or more, the error of the second walk is about 2 % of that of the first.
         assert error[key] == pytest.approx(true, rel=0.2)
         assert right["numerical_error"][key] < 1e-3 * true
 
@@ -110,7 +110,7 @@ def test_steps_of_a_cycle_are_matched_before_comparison():
     walks = [WALKED | {"steps": 18, "step_periods_s": each, "step_lengths_m": [0.3] * 18} for each in periods.values()]
     settled = [walk | {"repeats_after": 4} for walk in walks]
     assert change(*settled)["of_steps"]["step_period_s"][2:] == [0.0] * 16
-    # walks that do not repeat are compared step by step, and keep the largest change so far
+    # Walks that do not repeat are compared step by step. Each step has the largest change so far.
     assert change(*walks)["of_steps"]["step_period_s"][1:5] == [0.0, 0.3, 0.4, 0.4]
 
 

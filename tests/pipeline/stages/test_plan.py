@@ -1,4 +1,4 @@
-"""Tests of the stage `plan`: its answer, its figure, and the questions that it rejects."""
+"""Tests of the stage `plan`: its answer, its figure, and the requests that it rejects."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Read and compare walks recorded elsewhere: round trips, and 300 damaged files."""
+"""Tests of reading and comparing recorded walks: round trips, and 300 damaged files."""
 
 import contextlib
 import functools
@@ -37,7 +37,9 @@ def simulated(model):
 
 
 def table(walk, scale=1.0, unit="rad", noise=0.0, every=1, delay=0.0, legs=(0, 1)):
-    """A walk's angles as CSV, perhaps in other units, with noise, fewer samples and another origin of time."""
+    """Return the angles of a walk as CSV, optionally in other units, with noise, fewer samples and another origin of
+    time.
+    """
     trajectory, draw = walk.content["trajectory"], np.random.default_rng(1)
     time, angle = trajectory["time"], trajectory["angle"][:, legs]
     keep = np.flatnonzero(np.diff(time, prepend=-1.0) > 1e-7)[::every]
@@ -55,10 +57,12 @@ def written(folder, text, name="walk.csv"):
 
 @pytest.mark.parametrize(("model", "period", "length"), [("rigid", 1e-6, 1e-6), ("contact", 2e-4, 1e-3)])
 def test_exported_walk_is_read_back_with_the_same_steps(tmp_path, model, period, length):
-    """On compliant ground feet sink in and slip, so that touches by angles are a little later and shorter."""
+    """On compliant ground feet sink in and slip. Touches found from angles are therefore a little late, and step
+    lengths short.
+    """
     walk = simulated(model)
     read = walkerlab.read_walk(written(tmp_path, table(walk)))
-    count = read.summary["steps"]  # the last touch may be too late to be recorded
+    count = read.summary["steps"]  # The last touch may be too late to be in the recording.
     assert count >= 5
     assert read.summary["step_periods_s"] == pytest.approx(walk.summary["step_periods_s"][:count], abs=period)
     assert read.summary["step_lengths_m"] == pytest.approx(walk.summary["step_lengths_m"][:count], abs=length)
@@ -78,7 +82,7 @@ def test_walk_is_read_despite_noise_gaps_offsets_and_swapped_legs(tmp_path):
 
 @pytest.mark.parametrize("delay", [100.0, 1.7e9])
 def test_first_time_of_a_recording_does_not_matter(tmp_path, delay):
-    """Clocks of cameras count from when they were switched on, or from 1970."""
+    """The clock of a camera may count from when it was switched on, or from 1970."""
     lines = table(simulated("rigid"), every=4).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]
     later = [f"{float(time) + delay:.9f},{angles}" for time, angles in rows]
@@ -191,8 +195,8 @@ def test_result_becomes_stale_only_if_the_content_of_its_file_changes(tmp_path):
     ("begin", "end", "why"),
     [
         (1.0, 1.3, "step 2 has no sample"),
-        (1.36, 1.46, "step 2 has no sample"),  # around a heel strike
-        (0.9, 1.7, "step 2 has no sample"),  # over a whole heel strike, so that two steps would be one
+        (1.36, 1.46, "step 2 has no sample"),  # rows around a heel strike are missing
+        (0.9, 1.7, "step 2 has no sample"),  # so many rows are missing that two steps look like one
     ],
 )
 def test_missing_rows_are_an_error_with_their_position(tmp_path, begin, end, why):
@@ -213,7 +217,7 @@ def test_few_missing_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
 
 
 def test_recording_with_five_samples_per_step_is_rejected(tmp_path):
-    """Its steps would come out wrong by several percent, its velocities by half."""
+    """The steps would be wrong by several per cent, and velocities by half."""
     trajectory = simulated("rigid").content["trajectory"]
     time = np.arange(0.0, 4.0, 0.15)
     angle = [np.interp(time, trajectory["time"], leg) for leg in trajectory["angle"].T]
@@ -238,7 +242,7 @@ def test_dense_recording_is_thinned(tmp_path):
 
 
 def marker_recording(folder):
-    """The rigid walk as C3D: a hip and two feet, mm."""
+    """Write the rigid walk as a C3D file with a hip and two feet, in mm."""
     ezc3d = pytest.importorskip("ezc3d")
     trajectory = simulated("rigid").content["trajectory"]
     time = np.arange(0.0, 4.0, 0.005)
@@ -275,7 +279,7 @@ def test_truncated_c3d_file_is_rejected(tmp_path):
 def test_c3d_file_that_crashes_its_reader_is_rejected(tmp_path):
     path = marker_recording(tmp_path)
     content = bytearray(path.read_bytes())
-    content[600] = 255  # among the parameters; ezc3d 1.7.2 reads beyond their end
+    content[600] = 255  # This byte is among the parameters. It makes ezc3d 1.7.2 read beyond their end.
     path.write_bytes(content)
     with pytest.raises(ConfigError, match=r"walk\.c3d is not a C3D file"):
         walkerlab.read_walk(path, LEGS)
@@ -300,7 +304,7 @@ def test_bad_recording_is_rejected_before_anything_is_computed(tmp_path):
 
 
 class Notes(Silent):
-    """A progress that keeps the lines it receives."""
+    """Progress display that keeps the lines it receives."""
 
     def __init__(self):
         self.lines = []
@@ -311,10 +315,10 @@ class Notes(Silent):
 
 @pytest.mark.parametrize("noise", [0.001, 0.05, 0.3])
 def test_noise_that_blurs_heel_strikes_is_reported(tmp_path, noise):
-    """The amplitude of each leg is 0.2 rad; with noise of 0.05 rad periods of single steps vary by a tenth."""
+    """The amplitude of each leg is 0.2 rad. With noise of 0.05 rad, periods of single steps vary by a tenth."""
     path = written(tmp_path, table(simulated("rigid"), noise=noise))
     config, notes = load(None, (f"recording.file={json.dumps(str(path))}",)).config, Notes()
-    with contextlib.suppress(ConfigError):  # a walk may be hidden altogether
+    with contextlib.suppress(ConfigError):  # The noise may hide the walk completely.
         recorded_walk.run(restrict(config, PIPELINE["recorded-walk"].takes), {}, notes)
     if noise < 0.01:
         assert notes.lines == []
@@ -370,7 +374,7 @@ def test_impossible_path_is_rejected(name):
 
 
 def damaged(draw, lines):
-    """Return a recording with one defect, and the defect's name."""
+    """Return a recording with one defect, and the name of the defect."""
     head, *rows = lines
     row, cell = draw.randrange(len(rows)), draw.randrange(3)
     cells = rows[row].split(",")

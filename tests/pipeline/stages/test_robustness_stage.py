@@ -1,4 +1,4 @@
-"""Tests of the stage `robustness`: its answers, its stored results, and the questions that it rejects."""
+"""Tests of the stage `robustness`: its answers, its stored results, and the requests that it rejects."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ from walkerlab.views.report.answers import answer, further_tables
 from walkerlab.views.report.sections import robustness as robustness_section
 from walkerlab.views.report.sections.robustness import tables
 
-# design contract, section 4
+# keys that programs may rely on
 FIXED_KEYS = {
     "gait_sensitivity_norm": {"model", "disturbance", "indicator", "value", "direct", "unit", "scaled"},
     "sensitivity": {"model", "of", "to", "value", "unit"},
@@ -85,7 +85,7 @@ def test_sensitivity_to_slope_deg_is_per_degree(rigid):
     found = {(row["of"], row["to"]): row for row in rigid.summary["sensitivity"]}
     one = found["step_length_m", "slope_deg"]
     assert one["unit"] == "m per deg"
-    # a step of a compass on gentle slopes grows with about the slope's cube root
+    # On gentle slopes, the step of a compass grows with about the cube root of the slope.
     assert 0.2 < one["relative"] < 0.5
 
 
@@ -101,7 +101,7 @@ def test_robustness_answer_is_in_plain_words(rigid):
 
 
 def test_advice_names_a_walker_parameter_with_a_resolved_effect(rigid):
-    """It names neither gravity nor a parameter without effect."""
+    """The advice names neither gravity nor a parameter without effect."""
     row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm_scaled")
     others = [row | {"to": "gravity_m_s2", "relative": -9.0}, row | {"to": "walker.x", "why": "lost in rounding"}]
     own = [row | {"to": "walker.hip_mass_kg", "relative": 0.25}]
@@ -111,7 +111,7 @@ def test_advice_names_a_walker_parameter_with_a_resolved_effect(rigid):
 
 
 def test_scaled_norm_does_not_favour_longer_legs():
-    """All lengths together scale the walker, which leaves the dimensionless norm as it is; keys are the config's."""
+    """Changing all lengths together only scales the walker, so the dimensionless norm stays the same."""
     found = run("slope-3deg", "robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
     shares = {row["to"]: row.get("relative") for row in found.summary["sensitivity"] if row["of"] == SCALED}
     lengths = [key for key in shares if key.endswith("_m")]
@@ -129,7 +129,9 @@ def test_scaled_norm_does_not_favour_longer_legs():
 
 
 def test_push_reports_whether_the_ground_still_pushes(rigid, both):
-    """Compare with the force on all masses, weight and acceleration, along the walk after the push."""
+    """Compute the force of the ground from the weight and the acceleration of all masses during the walk after the
+    push.
+    """
     (push,) = rigid.summary["largest_push"]
     assert push["forward_normal_impulse_N_s"] > 0.0 > push["backward_normal_impulse_N_s"]
     said = said_of(rigid.summary)
@@ -169,7 +171,7 @@ def test_robustness_walks_do_not_depend_on_processes_or_interruptions(rigid, tmp
 
 
 def test_parameter_without_valid_neighbours_is_reported_with_the_reason():
-    """Legs of next to no mass follow no torque of the usual step."""
+    """For legs with almost no mass, the usual change of the torque is too large for a gait."""
     found = run("kuo", "robustness.to=[walker.hip.torque_N_m]", "robustness.roughness_m=[]", "robustness.steps=1")
     rows = found.summary["sensitivity"]
     assert {row["of"] for row in rows} >= {"period_s", "spectral_radius"}
@@ -196,7 +198,7 @@ def test_unstable_gait_has_no_norm_but_other_results():
 
 
 def test_missing_derivative_is_a_gap():
-    """The spectral radius has no derivative where multipliers meet."""
+    """The spectral radius has no derivative at points where multipliers meet."""
     rows = [
         {"of": "period_s", "to": "slope_rad", "value": 0.1},
         {"of": "spectral_radius", "to": "slope_rad", "value": None},
@@ -266,7 +268,7 @@ def test_both_models_report_similar_limits_for_each_leg(limping):
     rigid, contact = summary["largest_push"][:2], summary["largest_push"][2:]
     for one, other in zip(rigid, contact, strict=True):
         assert other["forward_N_s"] == pytest.approx(one["forward_N_s"], rel=0.1)
-    # leg 2 is pushed further forward before the walker falls: both models say so, by more than they differ
+    # In both models, leg 2 survives a larger forward push than leg 1, by more than the models differ.
     assert rigid[1]["forward_N_s"] > 1.2 * rigid[0]["forward_N_s"]
     norms = {(row["model"], row["leg"]): row["value"] for row in summary["gait_sensitivity_norm"][::6]}
     assert norms["contact", 1] / norms["contact", 2] == pytest.approx(norms["rigid", 1] / norms["rigid", 2], rel=0.05)

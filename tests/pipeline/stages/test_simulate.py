@@ -1,4 +1,4 @@
-"""Tests of the stage `simulate`: physical legs, requested outputs, and outcomes."""
+"""Tests of the stage `simulate`: results by leg, requested outputs, and outcomes."""
 
 import json
 import math
@@ -22,7 +22,7 @@ from walkerlab.pipeline.stages import fixedpoint, simulate
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.views.report.answers import answer
 
-# design contract, section 4
+# keys that programs may rely on
 FIXED_KEYS = {
     "outcome",
     "steps",
@@ -81,7 +81,7 @@ def test_steps_table_agrees_with_the_summary(paper):
     assert steps["touch_time_s"] == pytest.approx(np.cumsum(summary["step_periods_s"]), rel=1e-14)
     assert steps["touch_time_s"].tolist() == summary["touch_times_s"]
     assert steps["touch_along_m"] == pytest.approx(np.cumsum(summary["step_lengths_m"]), rel=1e-14)
-    # the legs change roles: what swung stands, what stood swings
+    # The legs change roles: the swing leg becomes the stance leg, and the stance leg the swing leg.
     assert (steps["state_before"][:, [1, 0]] == steps["state_after"][:, :2]).all()
 
 
@@ -89,7 +89,7 @@ def test_leg_angles_are_continuous_through_changes_of_roles(paper):
     trajectory = paper["trajectory"]
     time, angle, velocity = trajectory["time"], trajectory["angle"], trajectory["velocity"]
     assert (np.diff(time) > 0.0).all()
-    # the fastest moment may lie between samples
+    # The largest rate may occur between samples.
     bound = 1.01 * np.abs(velocity).max() * np.diff(time)[:, None] + 1e-12
     assert (np.abs(np.diff(angle, axis=0)) <= bound).all()
 
@@ -167,7 +167,9 @@ def test_pulling_ground_is_reported():
 
 
 def test_walk_reports_forces_that_no_ground_can_give():
-    """It reports a pull, also for a walk that falls, and too much friction, and nothing for a walk without either."""
+    """It reports that the ground would pull, even in a walk that falls, and too much friction. If there is neither, it
+    reports nothing.
+    """
     fast = run(contact=None, start=(-0.3, 0.25, -1.5, -2.6), strides=1).summary
     assert fast["min_normal_force_N"] < 0.0
     assert f"pull with {-fast['min_normal_force_N']:.3g} N" in fast["objections"][0]
@@ -220,7 +222,7 @@ def test_long_walk_needs_memory_only_for_its_steps():
         tracemalloc.stop()
     assert result.summary["steps"] == 4000
     table = sum(variable.values.nbytes for variable in result["steps"].variables.values())
-    # the table, its frozen copy, and the summary's lists; beside it, of the second walk, its table and lists
+    # the table, its frozen copy and the lists of the summary, and for the second walk its table and lists
     assert peak < 5 * table
 
 
@@ -232,7 +234,7 @@ def test_mid_step_start_is_simulated_unchanged():
 
 
 @pytest.mark.parametrize("name", ["paper", "torso", "kneed-round-feet"])
-def test_walk_continues_equally_from_any_mid_step_state(name):
+def test_walk_continues_the_same_way_from_any_mid_step_state(name):
     config = load(Path(name), ["strides=2"]).config
     gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     scene = rigid_scene(config, Footholds(), ("states",))
@@ -274,7 +276,7 @@ def test_walk_that_leaves_an_unstable_gait_says_so():
     assert sorted(last) == pytest.approx(sorted(right), abs=1e-5)
     errors = summary["numerical_error"]["of_steps"]["step_period_s"]
     assert max(errors[-4:]) < 1e-8
-    assert max(errors) > 1e-3  # of the steps on which the walk leaves the gait
+    assert max(errors) > 1e-3  # errors of the steps on which the walk leaves the gait
     head = answer("simulate", summary)[0]
     assert f"the last takes {last[-1]:.6f} s" in head
     said = " ".join(answer("simulate", summary)[1:3])
@@ -292,7 +294,7 @@ def test_walk_settling_on_a_two_step_gait_is_reported_as_alternating():
 
 
 def test_alternating_walk_shows_both_of_its_steps():
-    # the second walk, at tighter tolerances, still leaves the gait
+    # At tighter tolerances, the second walk is still leaving the gait.
     summary = run(slope_rad=math.radians(4.7), strides=60, outputs=[]).summary
     assert "between steps of 0.787082 and 0.715713 s" in " ".join(answer("simulate", summary))
 

@@ -8,7 +8,7 @@ from walkerlab.pipeline.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN,
 
 
 def walk(steps, per_step=50):
-    """Heel strikes at whole numbers, with a sample one rounding before each and one at it."""
+    """Return a walk with heel strikes at whole numbers. Each has a sample one rounding before it and one at it."""
     ends = np.arange(1.0, steps + 1.0)
     grid = np.arange(steps * per_step) / per_step
     time = np.unique(np.concatenate((grid, ends, np.nextafter(ends, 0.0))))

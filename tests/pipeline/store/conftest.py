@@ -1,4 +1,4 @@
-"""A content that uses all features of the format, and the attributes of its file."""
+"""Fixtures: a content that uses all features of the format, and the attributes of its file."""
 
 import contextlib
 import os

@@ -154,7 +154,7 @@ print(full_content().digest())
 
 
 def in_turn(content, size):
-    """Return a content whose first group with arrays, moved to the root, yields its variables one by one."""
+    """Return a content that yields variables one by one: those of the first group with arrays, moved to the root."""
     group = content["corrected/walk"]
     coordinates = {name: one for name, one in group.variables.items() if one.dims == (name,)}
     summary = {key: value for key, value in content.summary.items() if key != "best"}

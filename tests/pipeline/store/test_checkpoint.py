@@ -1,4 +1,4 @@
-"""Tests of checkpoints: complete entries survive; incomplete ones and those of another result do not."""
+"""Tests of checkpoints: complete entries survive, but incomplete ones and those of another result do not."""
 
 import math
 

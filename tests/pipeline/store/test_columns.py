@@ -11,7 +11,7 @@ from walkerlab.pipeline.store.content import columns, real_and_imaginary, rows_g
 
 @dataclass(frozen=True)
 class Stone:
-    """A stone that was dropped."""
+    """Record of a stone that was dropped."""
 
     kind: Annotated[str, Label("", "kind of stone")]
     depth_m: Annotated[float | None, Label("m", "how deep it fell")]
@@ -22,7 +22,7 @@ class Stone:
 
     @property
     def found(self) -> Annotated[bool, Label("1", "whether it was found")]:
-        """Whether it fell anywhere."""
+        """Whether the stone reached the ground."""
         return self.depth_m is not None
 
 

@@ -244,7 +244,7 @@ def test_forged_content_is_rejected_even_with_a_valid_seal(path, identity, alter
 
 
 def test_resealing_unchanged_content_is_accepted(path, identity):
-    """So the test above rejects files for the change, not for the new seal."""
+    """This shows that the test above rejects files because of the change, not because of the new seal."""
     with h5py.File(path, "r+"):
         pass
     image = path.read_bytes()

@@ -22,7 +22,7 @@ TEXTS = {"mixed": ["", "walked", "θ₂ é"], "empty": ["", "", ""], "short": ["
 
 @pytest.fixture
 def texts():
-    """Text of all kinds, between numbers by name, at the root and in a group."""
+    """Return a content with text of all kinds, at the root and in a group. By name, the texts lie between numbers."""
     step = {"step": Variable(np.arange(3), ("step",), "1", "step")}
     columns = {name: Variable(np.array(values, object), ("step",), "", name) for name, values in TEXTS.items()}
     more = {
@@ -55,7 +55,7 @@ def test_text_is_stored_with_a_fixed_length_and_long_attributes_are_readable(sto
         assert file["none"].shape == (0,)
         assert file.attrs["nothing"] == b""
         assert file.attrs["name"].decode() == "Hüfte"
-        assert json.loads(file.attrs["summary_json"]) == texts.summary  # 80,000 bytes
+        assert json.loads(file.attrs["summary_json"]) == texts.summary  # The attribute has 80,000 bytes.
     assert artifact.read(stored).digest() == texts.digest()
 
 
@@ -116,7 +116,7 @@ def test_nco_can_modify_a_copy(stored, tmp_path):
 
 
 def in_layout_2(path):
-    """Replace text of fixed length by text of variable length, as files of version 2 have it."""
+    """Turn a file into one of layout 2, which has text of variable length instead of fixed length."""
     text = h5py.string_dtype()
 
     def replace_attributes(node):

@@ -28,7 +28,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def holder(folder):
-    """Another process that holds the folder's lock."""
+    """Start another process that holds the lock of the folder."""
     environment = {**os.environ, "PYTHONPATH": str(Path(walkerlab.__file__).parent.parent)}
     command = [sys.executable, "-c", HOLD, folder.runs_dir]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as process:

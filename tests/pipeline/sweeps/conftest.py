@@ -1,4 +1,4 @@
-"""Sweeps of the toy pipeline, in this process and in others."""
+"""Fixtures for sweeps of the toy pipeline, in this process and in others."""
 
 import contextlib
 import os
@@ -65,9 +65,9 @@ def toy(tmp_path, monkeypatch):
 
 @pytest.fixture
 def marks(tmp_path, monkeypatch):
-    """Let computed points leave marks, and return a function that counts them."""
+    """Let every computed point leave a mark, and return a function that counts the marks."""
     folder = tmp_path / "marks"
     folder.mkdir()
-    input_cache.cache_clear()  # earlier sweeps in this process leave what they needed
+    input_cache.cache_clear()  # Forget the inputs that earlier sweeps in this process have cached.
     monkeypatch.setenv("TOY_SWEEP_MARKS", str(folder))
     return lambda: len(list(folder.iterdir()))

@@ -1,4 +1,4 @@
-"""Tests of a sweep's question: its points, stages and keys."""
+"""Tests of the request for a sweep: its points, stages and keys."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tests of a sweep with quick points: which are computed, which are reused, and what is stored."""
+"""Tests of a sweep with quick points: which points are computed, which are reused, and what is stored."""
 
 import csv
 import io
@@ -78,7 +78,7 @@ def test_points_without_an_answer_have_rows_with_the_reason(toy):
     assert needing.content[""]["reason"].tolist() == ["", "it needs drop: too steep: 1.2"]
 
 
-WALKED_AGAIN = ("gravity_m_s2=1.62",)  # what these walks need is not what those of other tests need
+WALKED_AGAIN = ("gravity_m_s2=1.62",)  # Other settings than in other tests, so that nothing is shared with them.
 
 
 def plain(sentences):
@@ -91,7 +91,8 @@ def test_evenly_spread_sample_of_walks_is_recomputed(toy):
     again = np.isfinite(swept.content[""]["numerical_error.end_time_s"])
     assert again.sum() == SAMPLE
     assert again[[0, -1]].all()
-    assert np.diff(np.flatnonzero(again)).max() <= 3  # of forty points sixteen: one of two or three
+    # Of forty points sixteen are recomputed, which is every second or third.
+    assert np.diff(np.flatnonzero(again)).max() <= 3
     told = {"walked_again": 16, "of": 40, "ended_otherwise": 0, "end_time_s": 1e-9, "step_period_s": 0.04}
     assert swept.summary["numerical_error"] == pytest.approx(told)
     assert plain(summary_lines(swept.summary)) == [
@@ -207,7 +208,7 @@ def test_damaged_chunk_is_recomputed(toy, marks):
     assert again.reused == 0
     assert [warning.partition(" is damaged: ")[0] for warning in warnings] == [str(path) for path in chunks]
     assert again.content.digest() == first.content.digest()
-    assert marks() == 5  # the same points, in the same process
+    assert marks() == 5  # The same points were computed in the same process.
 
 
 @pytest.mark.parametrize("why", [refused(Path("x"), OSError(28, "No space left on device")), KeyboardInterrupt()])

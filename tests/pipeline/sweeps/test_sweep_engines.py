@@ -1,4 +1,4 @@
-"""Kill workers on this machine, on Dask and in jobs; the other points are computed, and the fatal one is named."""
+"""Kill workers on this machine, on Dask and in jobs. The other points must be computed, and the fatal one named."""
 
 import contextlib
 import os
@@ -86,7 +86,7 @@ def test_accidental_death_of_a_worker_loses_nothing(toy, tmp_path, monkeypatch):
 
 
 def test_workers_that_cannot_start_are_reported_after_a_few_tries(toy, monkeypatch):
-    monkeypatch.setattr(work, "MAX_DEATHS", 2)  # each takes as long as a worker imports
+    monkeypatch.setattr(work, "MAX_DEATHS", 2)  # Each try takes as long as the imports of a worker.
     with pytest.raises(NoAnswer, match="all worker processes died"):
         toy.run("deadly", "seed=1:4:4", engine=LOCAL, engine_options=EngineOptions(1, modules=("no_such_module",)))
 
@@ -142,12 +142,12 @@ def test_concurrent_sweeps_on_one_folder_give_equal_results(toy, tmp_path):
     assert said[0] == said[1] == [toy.run("deadly", "seed=100:179:80").content.digest(), "0"]
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_dask_gives_the_same_result_and_survives_dead_workers(toy, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     with (
-        environment_of_workers(),  # restores what Dask leaves in this process's environment
+        environment_of_workers(),  # Dask changes the environment of this process, so restore it afterwards.
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -178,7 +178,8 @@ def test_cancelled_or_failed_job_is_reported_and_forgotten():
             raise self.error
 
     executor = JobExecutor(Job, 1)
-    for error in (CancelledError("its worker is gone"), ValueError("no result")):  # the first is no Exception
+    # The first of these errors is not an Exception.
+    for error in (CancelledError("its worker is gone"), ValueError("no result")):
         assert executor.submit(error).exception(timeout=10.0) is error
     deadline = time.monotonic() + 10.0
     while executor.jobs and time.monotonic() < deadline:
@@ -186,7 +187,7 @@ def test_cancelled_or_failed_job_is_reported_and_forgotten():
     assert not executor.jobs
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_dask_starts_a_local_cluster(toy):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     engine, address = parse_engine("dask")
@@ -197,10 +198,10 @@ def test_dask_starts_a_local_cluster(toy):
     assert [os.environ.get(name) for name in ONE_THREAD] == before
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_jobs_on_this_machine_give_the_same_result(toy, tmp_path, monkeypatch):
     submitit = pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
-    # how long submitit waits for a dead job's result on a slow network disk, and how often it looks for any
+    # how long submitit waits for the result of a dead job on a slow network disk, and how often it checks for results
     monkeypatch.setattr(submitit.Job, "_results_timeout_s", 0)
     monkeypatch.setattr(submitit.core.core, "_time", SimpleNamespace(time=time.time, sleep=lambda _: time.sleep(0.05)))
     options = {"cluster": "local", "timeout_min": "5"}
@@ -256,7 +257,7 @@ def test_unfinished_units_of_a_job_are_computed_by_another(slow, given_up):
 
 
 class OneFate(WorkerPool):
-    """A worker that takes everything it was given with it when it dies, as in Dask."""
+    """A worker that loses all its units when it dies, as in Dask."""
 
     def __init__(self):
         super().__init__(1)
@@ -336,7 +337,7 @@ def test_slurm_job_newer_than_the_last_listing_is_not_lost(tmp_path, monkeypatch
     assert queue.state("42", time.monotonic()) == "UNKNOWN"
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cloudpickle.py").write_text("raise SystemExit('imported')")
@@ -345,7 +346,7 @@ def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypa
             assert pool.submit(os.getpid).result(timeout=60)
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_dask_cluster_without_workers_gets_new_ones(monkeypatch):
     monkeypatch.setattr(engines, "RESTART_S", 1.0)
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
@@ -361,7 +362,7 @@ echo "Submitted batch job 42"
 """
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_slurm_job_requests_the_stated_resources(tmp_path, monkeypatch):
     pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     for name, text in (
@@ -383,7 +384,7 @@ def test_slurm_job_requests_the_stated_resources(tmp_path, monkeypatch):
     assert "/opt/python -u -m submitit" in job
 
 
-@pytest.mark.filterwarnings("ignore")  # of the library's own
+@pytest.mark.filterwarnings("ignore")  # warnings from inside the library
 def test_pickled_jobs_are_private(tmp_path):
     pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     run, jobs = tmp_path / "run", tmp_path / "run" / "jobs"
@@ -430,6 +431,6 @@ def test_chunk_size_follows_measured_times_and_shrinks_at_the_end():
     spread.unit_s = 0.01
     assert spread._batch_size(2) == 500
     spread.left = 60
-    assert spread._batch_size(2) == 50  # half a second of work, however little is left
+    assert spread._batch_size(2) == 50  # A batch is half a second of work, however little is left.
     spread.unit_s = 20.0
     assert spread._batch_size(2) == 1

@@ -1,4 +1,4 @@
-"""Compute the height of a bounce from the contact's stiffness."""
+"""Compute the height of a bounce from the stiffness of the contact."""
 
 from walkerlab.pipeline.store.content import Content
 

@@ -1,4 +1,4 @@
-"""Count the stones one by one, and end the process after as many as the test says."""
+"""Count the stones one by one. If a test says so, end the process after some of them."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Drop a stone. There is no answer beyond a slope of one radian. If a test names a file, the stage waits for it."""
+"""Compute the fall of a stone. There is no answer for slopes above one radian. If a test names a file, wait for it."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Take as many steps as requested, each of them a fall."""
+"""Simulate as many steps as requested, each of which is a fall."""
 
 from walkerlab.pipeline.store.content import Content
 

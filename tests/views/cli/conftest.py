@@ -1,4 +1,4 @@
-"""Fixtures that run the command line, of the real pipeline and of the toy one, in separate processes."""
+"""Fixtures that run the command lines of the real pipeline and of the toy pipeline in separate processes."""
 
 import json
 import os
@@ -18,7 +18,7 @@ ROOT = Path(walkerlab.__file__).parent.parent
 
 
 class Program:
-    """A program to be run on a folder of runs."""
+    """A program that can be run on a folder of runs."""
 
     def __init__(self, module, folder, *paths):
         self.module, self.command = module, [sys.executable, "-m", module]
@@ -29,7 +29,7 @@ class Program:
         return forks().run(self.module, arguments, self.folder, {**self.environment, **(environment or {})})
 
     def alone(self, *arguments):
-        """Run it in one process: to start others takes longer than the toy's stages."""
+        """Run the program in one process, because starting more would take longer than the stages of the toy."""
         return self(*arguments, "--jobs", "1")
 
     def start(self, *arguments, environment=None, **options):
@@ -46,7 +46,7 @@ class Program:
 
 @pytest.fixture
 def toy(tmp_path):
-    """The command line of the toy pipeline, in an empty folder."""
+    """Return the command line of the toy pipeline in an empty folder."""
     shutil.copytree(TOY, tmp_path / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "work").mkdir()
     return Program("toy", tmp_path / "work", tmp_path / "source")
@@ -54,13 +54,13 @@ def toy(tmp_path):
 
 @pytest.fixture
 def walker(tmp_path):
-    """The real command line, in an empty folder."""
+    """Return the real command line in an empty folder."""
     return Program("walkerlab", tmp_path)
 
 
 @pytest.fixture(scope="module")
 def edited(tmp_path_factory):
-    """The real command line in a folder with a run whose config file was edited afterwards."""
+    """Return the real command line in a folder with a run whose config file was edited afterwards."""
     walker = Program("walkerlab", tmp_path_factory.mktemp("edited"))
     file = walker.folder / "light.yaml"
     file.write_text("extends: paper\nstrides: 1\n")
@@ -71,7 +71,7 @@ def edited(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
-    """The toy pipeline's command line in a folder with one sweep, and what that printed."""
+    """Return the command line of the toy pipeline in a folder with one sweep, and the output of that sweep."""
     folder = tmp_path_factory.mktemp("sweep")
     shutil.copytree(TOY, folder / "source" / "toy", ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "work").mkdir()

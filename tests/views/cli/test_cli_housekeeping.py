@@ -69,10 +69,10 @@ def test_show_prints_summary_arrays_and_origin(toy):
 
 def test_show_exits_3_without_a_run_and_5_without_a_result(toy):
     done = toy("show", "drop")
-    assert done.returncode == 3  # there is no such run
+    assert done.returncode == 3  # The run does not exist.
     assert "advice: `walkerlab drop` creates it." in done.stderr
     toy("drop")
-    assert toy("show", "roll").returncode == 5  # the run has no such result
+    assert toy("show", "roll").returncode == 5  # The run exists, but has no such result.
     source = toy.folder.parent / "source" / "toy" / "physics.py"
     source.write_text(source.read_text() + "# changed\n")
     done = toy("show", "drop")

@@ -155,7 +155,7 @@ def test_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
 
 @pytest.fixture
 def caught(toy, tmp_path):
-    """A process in the middle of a stage."""
+    """Start a process, and return it in the middle of a stage."""
     begun, go_on = tmp_path / "begun", tmp_path / "go-on"
     process = toy.start("drop", "--json", environment={"TOY_BEGUN": str(begun), "TOY_GO_ON": str(go_on)})
     with process:

@@ -30,7 +30,7 @@ def test_table_with_only_sentences_is_shown():
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock that is set by hand, from 0 s."""
+    """Return a clock that is set by hand and begins at 0 s."""
     now = [0.0]
     monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
     return now
@@ -44,7 +44,8 @@ def test_remaining_time_is_estimated_only_after_a_tenth_of_the_work(clock):
         line.advance(done - line.done)
         told.append(line.seconds_left())
     assert told[:2] == [None, None]
-    assert told[2:] == pytest.approx([16.0, 14.4, 8.0])  # by the rates from 5 to 20, from 15 to 40 and from 20 to 60
+    # computed from the rates between 5 and 20, 15 and 40, and 20 and 60
+    assert told[2:] == pytest.approx([16.0, 14.4, 8.0])
 
 
 def test_slow_start_is_ignored_once_the_pace_is_known(clock):

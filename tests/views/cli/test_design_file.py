@@ -1,4 +1,4 @@
-"""Check that `walkerlab design` writes a config that extends its start and can walk, and overwrites none."""
+"""Check that `walkerlab design` writes a config that extends its start and can walk, and that it overwrites no file."""
 
 import json
 from pathlib import Path

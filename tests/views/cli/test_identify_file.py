@@ -1,4 +1,4 @@
-"""Go from a walk's exported steps to a config by `walkerlab identify`, in separate processes."""
+"""Export the steps of a walk and turn them into a config with `walkerlab identify`, in separate processes."""
 
 import json
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_exported_steps_are_read_back_unchanged(walker, config, model):
         assert measured.lengths_m.tolist() == steps["length_m"][:].tolist()
         if "state_after" in steps:
             assert measured.touch_angles_rad == pytest.approx(steps["state_after"][:, 1], abs=1e-12)
-        # the sample nearest in time, which is up to half an interval away
+        # The nearest sample is up to half an interval away.
         nearest = [int(np.abs(file["trajectory/time"][:] - time).argmin()) for time in steps["touch_time_s"][:]]
         legs = np.arange(len(nearest)) % 2
         assert measured.touch_angles_rad == pytest.approx(angle[nearest, legs], abs=0.01)

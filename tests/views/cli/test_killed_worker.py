@@ -1,4 +1,4 @@
-"""Check that killing workers makes a command end without an answer, but not report a bug."""
+"""Check that a command whose workers are killed ends without an answer, but does not report a bug."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ LONG = ("--set", "robustness.walks=4000", "--set", "robustness.roughness_m=[0.00
 @pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
 @pytest.mark.parametrize("command", ["robustness", "report"])
 def test_command_with_killed_workers_ends_without_an_answer(walker, command):
-    """All workers are killed, because another one may take over what one has left."""
+    """Kill all workers, because another worker could take over the work of a killed one."""
     process = walker.start(command, *ASKED, *LONG, "--jobs", "2")
     deadline, killed = time.monotonic() + DEADLINE_S, 0
     while process.poll() is None and time.monotonic() < deadline:

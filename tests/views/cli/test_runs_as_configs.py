@@ -1,4 +1,6 @@
-"""Tests of runs as configs: what `-c` accepts, where results go, and that none of another config is overwritten."""
+"""Tests of runs as configs: what `-c` accepts, where results go, and that results of other configs are not
+overwritten.
+"""
 
 import json
 import os
@@ -199,7 +201,7 @@ def test_damaged_results_are_reported_once_with_the_command_to_recompute_them(to
     artifacts = [toy.folder / "runs/paper" / name for name in ("drop.h5", "roll.h5")]
     for path in artifacts:
         data = path.read_bytes()
-        path.unlink()  # the other run has the same file where a result was taken over
+        path.unlink()  # The other run may share the file of a reused result.
         path.write_bytes(data[:-1])
     made = "`walkerlab drop -c runs/paper` and `walkerlab roll -c runs/paper` recompute them."
     done = toy("diff", "paper", "paper@strides=7")

@@ -36,7 +36,7 @@ class Address:
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
-    """Another server, started from a change."""
+    """Start another server with a changed config."""
     one = Served(tmp_path_factory.mktemp("other"), "--set", "slope_deg=3")
     yield one
     one.close()
@@ -52,17 +52,18 @@ def opened(browser, served, blocked=(), **seen):
 
 @pytest.fixture
 def page(browser, served):
-    """The page at rest, without gait curves, which would be computed for every test."""
+    """Return the page at rest, without gait curves, because computing them for every test would take too long."""
     yield opened(browser, served, ["*/api/along"], calm=True)
     browser.call("Network.setBlockedURLs", urls=[])
 
 
 @pytest.fixture
 def whole_page(browser, served):
-    """The complete page. Gait curves that are still being computed at the end are dropped."""
+    """Return the complete page. Gait curves that are still being computed at the end are abandoned."""
     yield opened(browser, served)
     browser.open(Address("about:blank"))
-    # What the page asked just before it was left may arrive after this question, which then is the older one.
+    # A request that the page sent just before it was left may arrive after this one, which then counts as the older
+    # one.
     assert 422 in (served.asked("/api/along", {"set": {"continuation.over": "nothing"}})[0] for _ in range(3))
 
 
@@ -95,7 +96,7 @@ def test_dragging_a_slider_changes_the_walk_and_can_be_undone(whole_page):
         value = page.evaluate(slider("slope_deg", place))
     assert page.evaluate("[history.length, location.hash]") == [before, ""]
     page.until(f"{SHOWN} === 'Shown: paper with slope_deg {value}'")
-    assert page.evaluate(f"{TIME} > 0.2")  # it went on from where it was
+    assert page.evaluate(f"{TIME} > 0.2")  # The walk continued from where it was.
     page.evaluate(slider("slope_deg", 600, "change"))
     page.until(f"{SHOWN}.startsWith('Shown: paper with slope_deg')")
     hash_of_first = page.evaluate("location.hash")
@@ -170,7 +171,7 @@ def test_outdated_result_does_not_replace_a_newer_one(page):
 
 
 def test_camera_follows_the_model_that_still_walks(page):
-    """The first minutes of the lesson of docs/explore.md: on pads of equal length the contact model trips."""
+    """This is the first part of the lesson in docs/explore.md: on pads of equal length the contact model trips."""
     typed(page, "slope_deg", "4.7")
     page.until(f"{SHOWN} === 'Shown: paper with slope_deg 4.7' && {STATE} === 'shown'")
     ends = page.evaluate("['simulate', 'contact-sim'].map((stage) => shown.answer[stage].touch_times_s.at(-1) ?? 0)")
@@ -208,7 +209,8 @@ def test_ground_parameters_plot_contact_gaits_on_a_log_axis(whole_page):
     typed(page, "contact.stiffness", "50000")
     page.until("along.key === 'contact.stiffness' && along.gaits?.every(({ model }) => model === 'contact')")
     page.until("along.series.length > 0")
-    assert page.evaluate("along.dot.getAttribute('visibility')") == "hidden"  # the rigid gait has no place there
+    # The rigid gait has no value of this parameter.
+    assert page.evaluate("along.dot.getAttribute('visibility')") == "hidden"
     marked = page.evaluate("along.value(along.fromX(Number(along.line.getAttribute('x1'))))")
     assert marked == pytest.approx(50000)
     labels = page.evaluate("[...along.curves.querySelectorAll('text.middle')].map((one) => one.textContent)")
@@ -268,12 +270,12 @@ def test_film_is_written_and_linked(page):
 def test_page_fits_the_screen_width(browser, served, width, dark):
     opened(browser, served, width=width, dark=dark, calm=True)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
-    assert browser.evaluate(TIME) == 0  # who asked for less motion starts it
+    assert browser.evaluate(TIME) == 0  # Readers who prefer reduced motion start the walk themselves.
 
 
 def test_keyboard_alone_can_change_a_parameter(page):
     page.evaluate("document.getElementById('turn-slope_deg').focus()")
-    # not by history.length, which browsers cap
+    # Browsers cap history.length, so it cannot be used here.
     count = "function () { places++; push.apply(this, arguments) }"
     page.evaluate(f"places = 0; push = history.pushState; history.pushState = {count}")
     page.press("ArrowRight", 39)
@@ -282,7 +284,7 @@ def test_keyboard_alone_can_change_a_parameter(page):
     for _ in range(5):
         page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight", windowsVirtualKeyCode=39)
     page.call("Input.dispatchKeyEvent", type="keyUp", key="ArrowRight", windowsVirtualKeyCode=39)
-    assert page.evaluate("places") == 2  # a key that is held is one place to come back to
+    assert page.evaluate("places") == 2  # Holding a key makes a single entry to go back to.
 
 
 def test_skip_link_keeps_the_parameters(page):
@@ -302,7 +304,7 @@ def test_typed_list_is_restored_from_the_address(page):
     page.evaluate("window.old = true; location.reload()")
     page.until(f"!window.old && typeof rows !== 'undefined' && {SHOWN}.endsWith('[0.002,-0.001]')")
     assert page.evaluate("rows.get('ground.heights_m').text.value") == "[0.002,-0.001]"
-    assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
+    assert page.evaluate("shown.answer.scene.ground.length") > 2  # The player draws ground at several levels.
 
 
 def test_looping_walk_continues_along_the_ground(whole_page):
@@ -321,7 +323,7 @@ def test_looping_walk_continues_along_the_ground(whole_page):
     frames = {}
     for time, metres, x in page.evaluate("said"):
         frames.setdefault(time, []).append((metres, x))
-    # where the hip is, by the numbers on the ground: it is drawn in the middle
+    # The hip is drawn in the middle, so the labels on the ground tell its position.
     hips = [a + (width / 2 - x) * (b - a) / (y - x) for (a, x), (b, y), *_ in frames.values()]
     steps = [after - before for before, after in itertools.pairwise(hips)]
     assert min(steps) > -0.01

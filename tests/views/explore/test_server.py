@@ -1,4 +1,4 @@
-"""Tests of `walkerlab explore` as a process: its numbers are those of the command, and errors have messages."""
+"""Tests of `walkerlab explore` as a process: values equal those of the command, and errors have messages."""
 
 import contextlib
 import http.client
@@ -20,7 +20,7 @@ from walkerlab.config.loader import load
 
 
 def settings(seed, count):
-    """Settings of three walkers at random."""
+    """Draw random settings of three walkers."""
     random = np.random.default_rng(seed)
     for number in range(count):
         config = ("paper", "simplest", "kneed")[number % 3]
@@ -31,7 +31,7 @@ def settings(seed, count):
 
 
 def same(served, config, changes, models):
-    """Compare the answer over the connection with that of the command."""
+    """Check that the answer of the server equals that of the command."""
     status, said = served.walk(changes, models, config=config)
     assert status == 200
     for stage in ("fixedpoint", *(name for model, name in STAGES.items() if model in models)):
@@ -40,7 +40,8 @@ def same(served, config, changes, models):
             assert "error" in said["fixedpoint"]
             continue
         if done.no_answer is not None:
-            # a moved slider does not wait for the search of nearby gaits, with which the command's advice begins
+            # The advice of the command begins with nearby gaits. The page does not search for them, since a moved
+            # slider cannot wait.
             assert done.summary["error"]["advice"].endswith(said[stage]["error"]["advice"])
             assert said[stage]["error"] | {"advice": ""} == done.summary["error"] | {"advice": ""}
         there = {key: value for key, value in said[stage].items() if key != "error"}
@@ -80,7 +81,7 @@ def test_copied_commands_print_the_values_on_the_page(served):
 
 
 def test_walk_beyond_the_first_flip_limps(served):
-    """The lesson of docs/explore.md."""
+    """This is the lesson of docs/explore.md."""
     changes = {"slope_deg": 4.7, "strides": 50, "contact.terrain": "after-mid-swing"}
     _, said = served.walk(changes, ["rigid", "contact"])
     for stage in STAGES.values():
@@ -92,7 +93,7 @@ def test_walk_beyond_the_first_flip_limps(served):
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
-    """Another server, which the last test that uses it ends."""
+    """Start another server. The last test that uses it ends it."""
     one = Served(tmp_path_factory.mktemp("other"))
     yield one
     one.close()
@@ -221,7 +222,7 @@ def test_newest_of_many_requests_is_answered_in_constant_memory(served):
 
     for slope in (2, 2.1, 2.2):
         served.walk({"slope_deg": slope})
-    # On a busy machine the worker for curves, of low priority, still loads its modules: wait until it has answered.
+    # On a busy machine, the worker for curves has low priority and may still load modules. Wait until it has answered.
     assert served.asked("/api/along", {"set": {"continuation.over": "nothing"}})[0] == 422
     processes = [served.process.pid, *(int(file.parts[2]) for file in workers_of(served.process.pid))]
     before = sum(map(resident_kB, processes))
@@ -254,7 +255,7 @@ def test_saved_config_contains_only_changes_and_overwrites_no_file(served):
     assert served.asked("/api/save", asked)[0] == 409
     assert served.asked("/api/save", {**asked, "name": "../mine.yaml"})[0] == 400
     assert served.asked("/api/save", {"set": {"slope_deg": 99}, "name": "steep"})[0] == 422
-    assert "slope_deg: 3.0" in said["text"]  # as it was typed
+    assert "slope_deg: 3.0" in said["text"]  # The value is saved as it was typed.
     status, said = served.asked("/api/save", {**asked, "name": "my walker"})
     assert (status, list(served.folder.glob("my walker*"))) == (422, [])
     assert "is not valid" in said["error"]["message"]
@@ -273,7 +274,7 @@ def test_gait_curves_equal_those_of_continuation(served):
 
 
 def test_attractors_are_not_returned_as_branches(served):
-    """The page itself asks for gaits of one step alone, of which there are no attractors."""
+    """The page requests only gaits of one step, for which there are no attractors."""
     span = {"over": "slope_deg", "from": 0.86, "to": 0.87, "points": 4, "periods": 2}
     block = {f"continuation.{key}": value for key, value in span.items()}
     status, said = served.asked("/api/along", {"config": "simplest", "set": block})
@@ -295,7 +296,8 @@ def test_abandoned_gait_requests_are_dropped_and_their_worker_kept(served):
     first = threading.Thread(target=ask)
     first.start()
     end = time.monotonic() + 60
-    while ticks_of(worker) - before < SOME_TICKS and time.monotonic() < end:  # until the first question is worked on
+    # Wait until the worker computes the first request.
+    while ticks_of(worker) - before < SOME_TICKS and time.monotonic() < end:
         time.sleep(0.05)
     ask(**rigid)
     first.join()
@@ -324,18 +326,19 @@ def test_slider_range_is_valid_and_wide(served):
             for end in {"from", "to"} & number.keys():
                 status, answer = served.asked("/api/numbers", {"config": config, "set": {key: number[end]}})
                 assert status == 200, answer
-    assert keys["walker.foot_to_mass_m"]["to"] == pytest.approx(1.0, rel=0.01)  # the leg ends there
-    assert keys["walker.foot_radius_m"]["to"] == pytest.approx(0.3)  # from 1 mm to feet that roll
+    # The slider ends at the length of the leg.
+    assert keys["walker.foot_to_mass_m"]["to"] == pytest.approx(1.0, rel=0.01)
+    assert keys["walker.foot_radius_m"]["to"] == pytest.approx(0.3)  # The range is from 1 mm to large feet that roll.
     assert keys["push_off.impulse_N_s"]["to"] == pytest.approx(0.1 * 20 * (9.81 * 1) ** 0.5)
     assert keys["walker.hip_mass_kg"]["log"]
     assert not keys["slope_deg"]["log"]
-    assert "from" not in keys["ground.heights_m"]  # a list is typed
-    assert "seed" not in keys  # no walk depends on it
+    assert "from" not in keys["ground.heights_m"]  # A list has no slider, so it is typed.
+    assert "seed" not in keys  # No walk depends on the seed.
     assert {key for key in keys if keys[key].get("gaits")} >= {"slope_deg", "contact.stiffness", "push_off.impulse_N_s"}
-    assert not keys["ground.roughness_m"]["gaits"]  # gaits are those of even ground
+    assert not keys["ground.roughness_m"]["gaits"]  # Gaits are for even ground only.
     _, said = served.asked("/api/numbers", {"config": "level"})
     [slope] = [number for number in said["numbers"] if number["key"] == "slope_deg"]
-    assert slope["from"] < 0 < slope["to"]  # what is driven walks uphill, too
+    assert slope["from"] < 0 < slope["to"]  # A driven walker can also walk uphill.
 
 
 def test_terminated_server_leaves_no_worker_or_report_process(tmp_path):
@@ -385,7 +388,7 @@ def at_work_for(folder):
     return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]
 
 
-SOME_TICKS = 30  # of a processor's clock: about 0.3 s of computing
+SOME_TICKS = 30  # clock ticks of processor time, about 0.3 s
 
 
 def nice(process):
@@ -400,7 +403,7 @@ def ticks_of(worker):
 
 
 def workers_of(process):
-    """Return the processes that this one has started and that still run."""
+    """Return the running processes that a process has started."""
     return [file for file in Path("/proc").glob("[0-9]*/status") if f"PPid:\t{process}\n" in text_of(file)]
 
 

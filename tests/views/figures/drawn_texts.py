@@ -1,11 +1,11 @@
-"""Texts that a renderer gets, and their places."""
+"""Find the texts of a figure as the renderer draws them, and where they are."""
 
 import pytest
 from matplotlib.text import Text
 
 
 def texts_drawn(figure):
-    """Return every text that the renderer receives, with its box."""
+    """Return every text that the renderer receives, with its bounding box."""
     seen, draw = [], Text.draw
 
     def noted(text, renderer):

@@ -1,4 +1,4 @@
-"""The example figure of docs/adding.md, built from the code on that page."""
+"""The example figure of docs/adding.md, made by the code on that page."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ PAGE = (Path(__file__).parents[3] / "docs" / "adding.md").read_text(encoding="ut
 
 
 def example():
-    """The figure; it has words only where they are written into a file."""
+    """Yield the figure. Its words exist only while they are written into a file."""
     names = {}
     exec(re.search(r"```python\n(from walkerlab\.views\.figures\.canvas.*?)```", PAGE, re.DOTALL)[1], names)
     return names["FIGURE"]

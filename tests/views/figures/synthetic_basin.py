@@ -15,7 +15,9 @@ Z = [0.17, -0.6, -0.86]
 
 
 def basin(attractor, aperiodic=False, config=CONFIG, steps=7):
-    """Cells walk where they have an attractor or -2, for none; the others fall."""
+    """Return a basin in which cells walk if they have an attractor, or -2 for a walk that does not settle. All others
+    fall.
+    """
     window = window_of(config, Z)
     attractor = np.resize(attractor, window.size)
     walks = attractor != UNREACHED

@@ -9,7 +9,7 @@ FLIP, END = 4.0, 5.0
 
 
 def branch(period, value, stable, spread, marks):
-    """Steps whose periods differ by `spread`; marks are the place, value and spread of flips."""
+    """Return a branch with steps whose periods differ by `spread`. `marks` has index, value and spread of flips."""
     points, steps = value.size, np.linspace(-1.0, 1.0, period) if period > 1 else np.zeros(1)
     sizes = {"step_period": (0.7, "s"), "stance_angle": (0.2, "rad")}
     variables = {

@@ -21,7 +21,7 @@ ENDS = (
 
 
 def stability_maps():
-    """Return maps with one column per outcome. Verdicts of the fixed step follow from small to large steps."""
+    """Return maps with one column per outcome. With a fixed step, verdicts are in the order of step sizes."""
     kept = {}
     for i in range(CELLS):
         for j, (outcome, sharper, error) in enumerate(ENDS):

@@ -1,4 +1,4 @@
-"""Results of `tune` set by hand as far as figures need them: walks, map of starts, and rigid limit."""
+"""Results of `tune` set by hand, with the parts that figures need: walks, map of starts, and rigid limit."""
 
 import numpy as np
 from synthetic_walks import motion, stored

@@ -11,7 +11,7 @@ LEG_LENGTH, SLOPE, HALF_ANGLE = 1.0, 0.0174, 0.187
 WEIGHT = 196.2
 LAW = {"terrain": "after-mid-swing", "static_friction": 0.9, "dynamic_friction": 0.7}
 STEP_LENGTH = 2.0 * LEG_LENGTH * np.sin(HALF_ANGLE)
-SAMPLES = 40  # of a step
+SAMPLES = 40  # number of samples in a step
 ORIGIN = Provenance(
     config="name: paper\n",
     command_line="walkerlab plot",
@@ -85,7 +85,7 @@ def walked(period, count, **more):
 
 
 def rigid(steps=10, period=0.7, outcome="walked", completed=None):
-    """Return the result of `simulate` with `completed` steps. In the remaining time no heel strike follows."""
+    """Return the result of `simulate` for a walk with `completed` steps. The rest of its time has no heel strike."""
     time, step, angle, velocity = motion(steps, period, jumps=True)
     done = steps if completed is None else completed
     numbered = {"step": Variable(step, ("time",), "1", "step")}
@@ -105,7 +105,9 @@ def contact(steps=10, period=0.71, outcome="walked", pads=True):
 
 
 def ground(step, time, period):
-    """Forces on the stance foot, and energy that goes where a step begins: 1 J to damping, 0.1 J to friction."""
+    """Return forces on the stance foot and losses. At the beginning of each step 1 J is lost to damping and 0.1 J to
+    friction.
+    """
     load = np.zeros((time.size, 2))
     load[np.arange(time.size), 1 - step % 2] = WEIGHT
     begun = np.searchsorted(period * np.arange(1, steps_of(step) + 1), time, side="left").astype(float)
@@ -127,7 +129,7 @@ def pads_group(steps):
 
 
 def compared(steps=10, period=0.7, aligned=True):
-    """The result of `compare`, as far as a figure needs it."""
+    """Return the parts of a result of `compare` that figures need."""
     time, phase = np.linspace(0.0, steps * period - 1e-9, 500), np.linspace(0.0, 1.0, 60)
     raw = 0.05 * np.stack((np.sin(3.0 * time), np.cos(3.0 * time)), axis=-1)
     in_phase = 0.004 * np.ones((steps, 1, 1)) * np.stack((np.sin(6.0 * phase), np.cos(6.0 * phase)), axis=-1)
@@ -153,7 +155,7 @@ def compared(steps=10, period=0.7, aligned=True):
 
 
 def without(result, group, *names):
-    """Return the result as stored when some variables were not requested."""
+    """Return the result as it is stored if the variables of a group were not requested."""
     left = {name: variable for name, variable in result[group].variables.items() if name not in names}
     return stored(result.identity.stage, {**result.groups, group: Group(left)}, result.summary)
 

@@ -6,8 +6,6 @@ from synthetic_basin import CONFIG, basin
 
 from walkerlab.config.loader import load
 from walkerlab.physics.orbits.basin import UNREACHED
-from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.content import Content
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.maps import FIGURE_15 as FIGURE
 from walkerlab.views.figures.maps import attractor_name, sides_of
@@ -76,10 +74,9 @@ def test_drawings_include_the_basin_once_it_exists(stage):
 
 def test_basin_command_draws_its_figure_at_once(tmp_path):
     made = basin([0, 0, 1, UNREACHED])["basin"]
-    artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
-    (path,) = plot.draw_at_once("basin", tmp_path, anew=True)
+    (path,) = plot.draw_at_once("basin", made, tmp_path, anew=True)
     assert path == tmp_path / "figures" / "figure-15.svg"
     assert path.read_bytes() == FIGURE.render({"basin": made}).svg
     path.write_text("as it was")
-    assert plot.draw_at_once("basin", tmp_path, anew=False) == [path]
+    assert plot.draw_at_once("basin", made, tmp_path, anew=False) == [path]
     assert path.read_text() == "as it was"

@@ -46,7 +46,7 @@ def original(tmp_path_factory):
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
-    # without, all results are read to know the config
+    # Without it, all results would be read to find the config.
     RunFolder.open_folder(folder).write_record(Record("paper", "", to_yaml(load().config)))
     return folder
 
@@ -68,7 +68,7 @@ def test_figure_is_exported_in_every_format(run, kind, start):
 
 
 READERS_OF_RESULTS = {"figure-08", "figure-09", "figure-10", "figure-13", "accuracy-rigid", "stability-step"}
-"""Figures of every stage, and those that draw whatever results there are."""
+"""Figures of every stage, and figures that draw whichever results exist."""
 
 
 def test_exported_figure_equals_that_of_the_page(run, monkeypatch):

@@ -154,7 +154,7 @@ def test_multipliers_that_meet_become_complex():
         }
     )
     found = multipliers_of(DrawnBranch("rigid", group))
-    # both are real up to a product of a quarter, and then on a circle of its root
+    # Both are real up to a product of a quarter. Then they lie on a circle whose radius is the root of the product.
     exact = [np.sort(np.abs(np.roots([1.0, -1.0, one])))[::-1] for one in interpolate(product)]
     np.testing.assert_allclose(np.abs(found), exact, atol=1e-9)
 

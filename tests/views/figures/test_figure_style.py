@@ -51,7 +51,7 @@ SPECIAL_IN = {
     "tuned, far apart": ("figure-12",),
     "families without a bifurcation": ("figure-13",),
 }  # fmt: skip
-"""Figures that show what is special about some results; the others look as they do of results above."""
+"""Figures that differ for some special results. All others look as they do for the results above."""
 NARROW, _ = COLUMN_WIDTHS.values()
 CASES = [
     pytest.param((results, figure, width), id=f"{name}-{figure.name}-{width:g}")
@@ -59,16 +59,16 @@ CASES = [
     for figure in (*FIGURES, OF_THE_DOCS)
     if figure.why_left_out(results, {}) is None and figure.name in SPECIAL_IN.get(name, (figure.name,))
     for width in COLUMN_WIDTHS.values()
-    if name not in SPECIAL_IN or width == NARROW  # where texts have least room
+    if name not in SPECIAL_IN or width == NARROW  # Texts have the least room in the narrow width.
 ]
 WITH_UNIT = re.compile(r".+ \((deg|m|mm|s|m/s|rad|rad/s|kg|J|N|N/m²·²|SI)\)")
 PURE = re.compile("error|steps?|right-hand sides|(real|imaginary) part|magnitude|factor on .*")
 SMALLEST = 5.0
-"""Smallest size of letters (pt)."""
+"""Minimum size of letters (pt)."""
 TOLD_APART = 15
-"""Least difference of a part of two colours, of 255."""
+"""Minimum difference of two colours in one channel, out of 255."""
 VISIBLE = 0.1
-"""Least difference of brightness between lines that lie on one another."""
+"""Minimum difference of brightness between overlapping lines."""
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_outcomes_have_distinct_colours_in_every_map():
 
 
 def brightness(colour):
-    """Grey level of a colour '#RRGGBB' on a grey printer, 0 black to 1 white (Rec. 601 luma)."""
+    """Return the grey level of a colour '#RRGGBB' on a grey printer, from 0 (black) to 1 (white), as Rec. 601 luma."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return 0.299 * red + 0.587 * green + 0.114 * blue
 

@@ -1,4 +1,4 @@
-"""Tests of what the figures show, and when they are drawn."""
+"""Tests of the contents of figures, and of the conditions under which they are drawn."""
 
 import functools
 import hashlib
@@ -51,7 +51,7 @@ def caption_of(figure, results):
 
 
 def lines_of(axes, look):
-    """Return the data lines of a look's colour and width."""
+    """Return the data lines that have the colour and width of a look."""
     return [
         line
         for line in axes.lines
@@ -122,7 +122,8 @@ def test_figures_not_in_the_paper_are_called_by_name():
 
 def test_every_figure_has_a_text_and_every_text_a_figure():
     assert [figure.name for figure in ALL_FIGURES if not figure.title or figure.title.endswith(".")] == []
-    shared = {"cycle", "counted", "figure-17", "push-off-or-hip", "sweep", "went"}  # and the words of a sweep
+    # texts without a figure of that name, and the words of a sweep
+    shared = {"cycle", "counted", "figure-17", "push-off-or-hip", "sweep", "went"}
     files = {path.stem for path in WORDS.folder.glob("*.j2")}
     assert files - shared == {figure.words or figure.name for figure in ALL_FIGURES}
 
@@ -133,7 +134,7 @@ def module_of(figure):
 
 
 OF_MODULES = {module_of(figure): figure.name for figure in FIGURES}
-"""A figure of each module that draws."""
+"""One figure of each module that draws figures."""
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Tests of figures of the ground's forces and losses, with walks set by hand."""
+"""Tests of figures of ground forces and losses, with walks set by hand."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,9 @@ def test_losses_of_a_step_are_independent_of_the_sampling():
 
 
 def test_work_of_drives_is_not_shown_as_a_loss():
-    """A push-off gives back what a step loses: the energy stays, and straight legs have no knees to lose it."""
+    """A push-off gives back what a step loses, so the energy stays the same. Straight legs have no knees that could
+    lose energy.
+    """
     walk = contact()
     gone = walk["trajectory"]
     given = Variable(150.0 - gone["total_energy_J"], ("time",), "J", "given")

@@ -1,4 +1,4 @@
-"""Tests of the words in figures of an identification."""
+"""Tests of the texts in figures of an identification."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tests of the stage `plot`: its files, its index, and the figures that it leaves out."""
+"""Tests of the stage `plot`: its files, its index, and the figures that it omits."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ WITHOUT_CONTACT = [LeftOut(name, "the config has no contact block") for name in 
 
 
 class Count:
-    """A progress that counts its calls."""
+    """Progress display that counts its calls."""
 
     def __init__(self):
         self.total, self.done = None, 0
@@ -38,14 +38,14 @@ def draw(folder, results, left_out=(), progress=None, early=None):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The folder and the content of a run of both models."""
+    """Return the folder and the content of a run of both models."""
     folder = tmp_path_factory.mktemp("whole")
     return folder, draw(folder, both_models())
 
 
 @pytest.fixture(scope="module")
 def rigid_only(tmp_path_factory):
-    """Return the same for a run without contact, in a folder in which something was drawn before."""
+    """Return the same for a run without contact, in a folder that already had drawings."""
     folder = tmp_path_factory.mktemp("rigid")
     (folder / "figures").mkdir()
     for name in ("figure-06.svg", "figure-02.png", "figure-mine.svg"):
@@ -55,13 +55,13 @@ def rigid_only(tmp_path_factory):
 
 
 def papers_left_out(content):
-    """Return the figures left out of those that these walks could draw. Accuracy, tune and maps have no result here."""
+    """Return the omitted figures, except those of accuracy, tune and maps, which have no result here."""
     elsewhere = ("it needs accuracy", "it needs tune", "it needs stability-maps")
     return [entry for entry in content.summary["left_out"] if entry["why"] not in elsewhere]
 
 
 def names(folder):
-    return sorted(path.name for path in (folder / "figures").iterdir())
+    return sorted(path.name for path in folder.glob("figures/*"))
 
 
 def test_every_figure_is_an_svg_and_a_png(whole):

@@ -1,4 +1,4 @@
-"""Tests of the figures of robustness: sweeps over one number, and walks on rough ground."""
+"""Tests of the figures of robustness: sweeps over one parameter, and walks on rough ground."""
 
 import numpy as np
 import pytest

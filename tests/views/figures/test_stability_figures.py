@@ -1,4 +1,4 @@
-"""Tests of the stability maps: every cell has its place and colour, and a missing error is not drawn as one."""
+"""Tests of the stability maps: every cell has its position and colour, and a missing error is not drawn as an error."""
 
 import numpy as np
 from matplotlib.colors import to_hex

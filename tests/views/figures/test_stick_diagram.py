@@ -1,4 +1,4 @@
-"""Check the geometry of stick diagrams: legs keep their length, and stance feet their place."""
+"""Check the geometry of stick diagrams: legs keep their length, and stance feet do not move."""
 
 from dataclasses import replace
 
@@ -124,7 +124,7 @@ def test_ground_without_pads_is_a_plane_explained_in_the_caption():
 
 
 def coloured(picture, look):
-    """Return the number of a picture's pixels that have a leg's colour."""
+    """Return the number of pixels of a picture that have the colour of a leg."""
     return int((picture == np.round(255.0 * np.array(to_rgb(look.colour))).astype(np.uint8)).all(axis=2).sum())
 
 
@@ -162,13 +162,13 @@ def test_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
 
 def test_film_holds_the_fall_for_a_second():
     walk = read_sticks(contact(1, outcome="fell"))
-    late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on
+    late = replace(walk, time=walk.time * 1.5)  # The walk goes on after the last landing.
     times = film_times(late, None, 25, 1.0)
     assert times[-25:].tolist() == [late.time[-1]] * 25
-    assert film_times(late, 1, 25, 1.0)[-1] < late.strikes[0]  # the first step alone was asked for
+    assert film_times(late, 1, 25, 1.0)[-1] < late.strikes[0]  # Only the first step was requested.
     assert film_times(replace(late, ending=""), None, 25, 1.0)[-1] < late.time[-1]
     falling, fallen = pictures(late, late.time[-1:] * np.array([0.999, 1.0]))
-    assert (falling != fallen).any()  # the clock says that it fell
+    assert (falling != fallen).any()  # The clock shows that the walker fell.
 
 
 @pytest.mark.parametrize("landings", [1, 4, 5, 10])

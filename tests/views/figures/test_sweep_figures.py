@@ -14,9 +14,7 @@ PARAMETERS = ("slope_deg", "hip_mass_kg")
 
 
 def swept(slopes, masses, answered=True):
-    """Return a multiplier that grows with the slope past one, on a grid, optionally without an answer at its first
-    point.
-    """
+    """Return a sweep whose multiplier grows beyond one with the slope, optionally with no answer at its first point."""
     slope, mass = np.linspace(1.0, 5.0, slopes), np.linspace(5.0, 15.0, masses)
     radius = 0.3 * slope[:, None] + 0.01 * mass
     radius[0, 0] = radius[0, 0] if answered else np.nan

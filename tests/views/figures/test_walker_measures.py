@@ -1,4 +1,4 @@
-"""Tests of the drawings of walkers: keys, places of the dimensions, and agreement with the docs."""
+"""Tests of the drawings of walkers: keys, positions of the dimensions, and agreement with the docs."""
 
 import itertools
 import re
@@ -38,7 +38,7 @@ def pictures():
 
 
 def test_pictures_in_the_docs_are_current(pictures):
-    """Compare their words only: shapes of letters and lines depend on the version of matplotlib."""
+    """Compare only the words, because shapes of letters and lines depend on the version of matplotlib."""
     assert {name: words((SCRIPT["IMAGES"] / name).read_bytes()) for name in pictures} == {
         name: words(picture) for name, picture in pictures.items()
     }
@@ -95,7 +95,7 @@ OF_TYPES = (
 
 
 def parts(radius=0.0, at=(0.0, 0.0)):
-    """Two legs on a hip with a mass on it, another one beside, and feet of a radius."""
+    """Return the parts of two legs on a hip, with one mass at the hip and one next to it, and with round feet."""
     legs = ("leg 1", "leg 2")
     return PartsWalker(
         type="parts",

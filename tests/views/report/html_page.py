@@ -1,4 +1,4 @@
-"""Parse a page as a reader's program does."""
+"""Parse a page in the way of a screen reader."""
 
 from html.parser import HTMLParser
 
@@ -6,7 +6,7 @@ VOID = {"meta", "img", "input", "line", "polyline"}
 
 
 class Page(HTMLParser):
-    """A page as a screen reader sees it: elements, ids, texts by element."""
+    """A page as a screen reader sees it: elements, ids, and texts by element."""
 
     def __init__(self, html):
         super().__init__()

@@ -7,7 +7,9 @@ import pytest
 
 
 def compile_tables(texts, options, folder):
-    """Set tables in an article; return LaTeX's complaints of errors and of boxes that run past the text block."""
+    """Typeset tables in an article. Return LaTeX's messages about errors and about boxes that are too wide for the text
+    block.
+    """
     latex = shutil.which("pdflatex")
     if latex is None:
         pytest.skip("LaTeX is not installed: apt install texlive-latex-recommended texlive-science")

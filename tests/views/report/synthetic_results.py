@@ -1,4 +1,4 @@
-"""A small run for the report: a real walk, with summaries of round values, in the layout of the stages."""
+"""A small run for the report: a real walk, and summaries with round values in the layout of the stages."""
 
 import sys
 from dataclasses import replace
@@ -84,7 +84,7 @@ def simulate(outcome="walked", steps=STEPS, **changed):
 
 
 def contact_sim(outcome="walked", steps=STEPS, hip=None, **changed):
-    """The walk on compliant ground; `hip` the height at which the hip ends instead."""
+    """Return the walk on compliant ground. If given, `hip` replaces the height of the hip at the end."""
     trajectory = first_steps("contact-sim", steps)
     if hip is not None:
         ends = trajectory.variables["hip_height_m"]
@@ -107,7 +107,7 @@ def contact_sim(outcome="walked", steps=STEPS, hip=None, **changed):
 
 
 def families_that_move(walk):
-    """A family of gaits, two of which move as a walk does."""
+    """Return a family of gaits. Two of them have the motion of a walk."""
     family = families()["continuation"]
     seen = walk.groups["trajectory"].variables
     two = {
@@ -151,11 +151,13 @@ EVERYTHING = {"fixedpoint": fixedpoint, "simulate": simulate, "contact-sim": con
 
 
 DRAWN = ("figure-06", "figure-07", "figure-08", "figure-09", "figure-13", "accuracy-rigid", "stability-step")
-"""Figures of every form: on one axis, side by side, one above the other, with equal scales, with a bar of colours."""
+"""Figures of every form: with one axis, panels side by side, panels one above the other, equal scales, and a colour
+bar.
+"""
 
 
 def plotted(folder):
-    """Figures, drawn into the folder as `plot` draws them."""
+    """Draw figures into the folder as `plot` does."""
     known = {**both_models(), **measured_methods(), **stability_maps(), "continuation": families()["continuation"]}
     figures = []
     for figure in (one for one in FIGURES if one.name in DRAWN):

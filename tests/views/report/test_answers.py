@@ -1,4 +1,4 @@
-"""Tests of answers on stdout: a headline in words, symbols and units, digits that count, and shortened rows."""
+"""Tests of answers on stdout: headlines in words, symbols and units, significant digits, and shortened rows."""
 
 import csv
 
@@ -46,7 +46,7 @@ WALK = {
 
 
 def row(lines, head):
-    """Return the cells of a table's row, without its head."""
+    """Return the cells of a row of a table, without the row head."""
     (found,) = (line for line in lines if line.startswith(f"{head}  "))
     return found.removeprefix(head).split()
 

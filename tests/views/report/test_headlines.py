@@ -1,4 +1,4 @@
-"""Tests of headline numbers, also of a stage that is not known."""
+"""Tests of headline values, including those of a stage that the package does not know."""
 
 import pytest
 

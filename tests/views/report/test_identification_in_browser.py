@@ -1,4 +1,4 @@
-"""Check in a real browser that the page of an identified walker plays both walks, measured and identified."""
+"""Check in a real browser that the page of an identified walker plays both the measured and the identified walk."""
 
 from pathlib import Path
 

@@ -18,8 +18,8 @@ from walkerlab.views.report.sections import motion, verdict
 from walkerlab.views.report.stage import write_pages
 
 WALKS = ("fixedpoint", "simulate", "contact-sim", "compare")
-OTHER_PERIOD = 0.54259  # s, of the gait with the trailing knee free in the impact, recomputed elsewhere
-PERIOD = 0.564328  # s, of the published rule
+OTHER_PERIOD = 0.54259  # s, period of the gait whose trailing knee is free in the impact, recomputed independently
+PERIOD = 0.564328  # s, period by the published rule
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_both_kneed_models_walk_on_plain_ground(run):
     assert compared["dissipated_J"]["knee_strikes"] > 0.0
 
 
-def test_knee_strikes_are_stored_and_reported_equally_in_both_models(run):
+def test_knee_strikes_are_stored_and_reported_in_the_same_way_for_both_models(run):
     results, _ = run
     for stage in ("simulate", "contact-sim"):
         times, steps = results.summary(stage)["knee_strike_times_s"], results.group(stage, "steps")
@@ -62,7 +62,7 @@ def test_time_of_release_decides_which_gait_is_walked(run):
     assert all(walk["steps"] == CONTACT_STEPS for walk in releases.values())
     assert releases["compression"]["period_s"] == pytest.approx(PERIOD, abs=2e-3)
     assert releases["touch"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=2e-3)
-    # the rigid model by either rule: the published gait, and the other one
+    # gaits of the rigid model by both rules
     assert releases["compression"]["rigid"]["period_s"] == pytest.approx(PERIOD, abs=1e-6)
     assert releases["touch"]["rigid"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=1e-5)
     assert "determines the gait" in verdict.departure(results)

@@ -1,4 +1,6 @@
-"""Use the report in a real browser: it loads nothing, its player plays, all views follow, and no table overflows."""
+"""Tests of the report in a real browser: it loads no other files, the player plays, all views follow, and no table
+overflows.
+"""
 
 import html
 import itertools
@@ -79,7 +81,7 @@ def test_additional_pages_log_no_errors(browser, folder):
 
 
 HOSTILE = """</script><img src=x onerror="window.harmed = 1">'"><svg onload='window.harmed = 1'>&lt;b&gt;"""
-"""Text that would run or become an element if a page took it for markup: in a text, an attribute or a script."""
+"""Text that would run or become an element if a page took it for markup in a text, an attribute or a script."""
 DRAWING = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9" onload="window.harmed = 1">
 <script>window.harmed = 1</script><a href="javascript:window.harmed = 1"><text>linked</text></a>
 <image href="file:///etc/passwd"/><path d="M0 0L9 9" onclick="window.harmed = 1" style="fill: url(https://elsewhere)"/>
@@ -88,7 +90,7 @@ DRAWING = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9" onload="
 
 @pytest.fixture(scope="module")
 def hostile_folder(tmp_path_factory):
-    """A report in which every free text, from the config, the results and the figures, is hostile."""
+    """Write a report in which every free text of the config, the results and the figures is hostile."""
     folder = tmp_path_factory.mktemp("hostile")
     source = {
         "title": HOSTILE,
@@ -121,10 +123,10 @@ def test_hostile_names_and_labels_are_shown_as_text(browser, hostile_folder):
             == 0
         )
         assert browser.evaluate("document.scripts.length") == 1
-        assert browser.complaints() == []  # nothing that its policy had to stop
+        assert browser.complaints() == []  # The content policy had nothing to stop.
         assert browser.requests() == [file.as_uri()]
     browser.open(hostile_folder / "report.html")
-    # as often as it was put in: heading, source, advice, figure, command line
+    # The text occurs where it was put in: heading, source, advice, figure, command line.
     assert browser.evaluate("document.documentElement.textContent").count(HOSTILE) >= 8
     assert HOSTILE in browser.evaluate("document.querySelector('[data-large]').getAttribute('aria-label')")
     assert browser.evaluate("document.querySelector('cite a').protocol") == "https:"
@@ -204,7 +206,7 @@ LETTERS = """[...document.querySelectorAll('.picture text, .diagram text, .sheet
 
 @pytest.fixture(scope="module")
 def folder_with_figures(tmp_path_factory):
-    """The same report with figures as they are drawn."""
+    """Return a report with real figures."""
     folder = tmp_path_factory.mktemp("drawn")
     made = {name: make() for name, make in EVERYTHING.items()}
     made["continuation"] = families_that_move(made["simulate"])
@@ -317,7 +319,7 @@ def test_printed_page_has_stills_and_unfolded_sections(page):
 
 
 def test_walk_is_on_the_first_printed_page(browser, folder):
-    browser.open(folder / "report.html", width=680, height=1009)  # A4 without its margins of 15 mm
+    browser.open(folder / "report.html", width=680, height=1009)  # A4 without margins of 15 mm.
     browser.evaluate("dispatchEvent(new Event('beforeprint'))")
     browser.call("Emulation.setEmulatedMedia", media="print")
     assert browser.evaluate("document.querySelector('.stills').getBoundingClientRect().bottom") < 1009

@@ -204,7 +204,7 @@ def test_templates_use_only_defined_names(templates):
     names = templates.list_templates(extensions=["j2"])
     assert names
     for name in names:
-        templates.get_template(name)  # an unknown filter is refused here
+        templates.get_template(name)  # Loading raises an error for an unknown filter.
     with pytest.raises(UndefinedError):
         templates.from_string("{{ numbr }}").render()
 
@@ -214,7 +214,7 @@ def test_sentence_is_one_line_with_nonbreaking_spaces():
     assert "\n" not in words("stability.judgement")
 
 
-def test_template_parts_are_separated_and_not_empty():
+def test_parts_of_templates_are_separated_and_not_empty():
     assert parts("| one |\n two,\u00a0m | | three|four |") == ["one", "two,\u00a0m", "three|four"]
     assert join_row(" a |\n b | c |") == "a, b and c"
     assert words.terms("adjustment.walks", True)["released"] == "without the joint, from the rigid state"

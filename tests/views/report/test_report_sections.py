@@ -1,4 +1,4 @@
-"""Tests of the report's sections: the verdict first, and a section for each result there is."""
+"""Tests of the sections of the report: the verdict comes first, and each result has a section."""
 
 import base64
 import subprocess
@@ -134,7 +134,7 @@ def test_verdict_opens_with_results_failures_and_conclusions():
     said = opening(compare=other, **{"contact-sim": contact_sim(**slower)})
     assert "takes 1 % more time than in the rigid gait" in said
     uneven = opening(sets=("ground.roughness_m=0.001",), compare=other, **{"contact-sim": contact_sim(**slower)})
-    assert uneven == "Both models walk all 4 steps, and the gait is stable."  # no two of its steps are alike
+    assert uneven == "Both models walk all 4 steps, and the gait is stable."  # Every step differs from the others.
     fallen = opening(compare=other, **{"contact-sim": contact_sim("fell", 3)})
     assert fallen == (
         "The rigid model walks all 4 steps, the contact model walks 3 steps and then falls, and the gait is stable. "
@@ -385,7 +385,7 @@ def test_provenance_lists_key_digest_commit_and_command_of_each_result():
 
 
 def channels(walker):
-    """Return the numbers of a player's walker, by name."""
+    """Return the channels of a walker in the player, by name."""
     floats = np.frombuffer(base64.b64decode(walker.track.pack()), "<f4").reshape(len(walker.track.channels), -1)
     return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 

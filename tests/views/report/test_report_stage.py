@@ -1,4 +1,4 @@
-"""Tests of the stage `report`, which makes one file and its index from results and figures."""
+"""Tests of the stage `report`, which makes one page and an index from results and figures."""
 
 import hashlib
 

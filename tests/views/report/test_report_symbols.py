@@ -1,4 +1,4 @@
-"""Check that formulas in plain spelling get their signs, and that prose is not changed."""
+"""Check that formulas in plain spelling get mathematical symbols, and that prose is not changed."""
 
 import pytest
 

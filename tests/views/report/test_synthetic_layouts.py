@@ -19,11 +19,13 @@ SYNTHETIC = {
     "families that move": lambda: {"continuation": synthetic_results.families_that_move(synthetic_results.simulate())},
     "tune": lambda: {"tune": synthetic_tune.tuned()["tune"]},
 }
-NO_LIMIT = "limit"  # takes seconds: its columns are asked for by paper/figures.py
+NO_LIMIT = "limit"  # Computing this group takes seconds. Its columns are those that evidence/paper/figures.py requests.
 
 
 def kinds(groups):
-    """The variables of groups that differ in number only, as branch_0 and branch_1, with dimensions and unit."""
+    """Return variables with dimensions and unit. Groups whose names differ only in a number, such as branch_0 and
+    branch_1, are merged.
+    """
     found = {}
     for path, group in groups.items():
         there = found.setdefault(re.sub(r"\d+", "N", path), {})
@@ -32,7 +34,7 @@ def kinds(groups):
 
 
 def keys(summary):
-    """The keys of a summary, those of blocks and of rows dotted."""
+    """Return the keys of a summary. Those inside blocks and rows are dotted."""
     for key, value in summary.items():
         rows = value if isinstance(value, list) else [value]
         inner = {below for row in rows if isinstance(row, dict) for below in keys(row)}

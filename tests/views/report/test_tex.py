@@ -1,4 +1,4 @@
-"""Tests of LaTeX tables: aligned decimals, one number of digits per column, and heads and captions in words."""
+"""Tests of LaTeX tables: decimals are aligned, digits are equal in a column, and heads and captions are in words."""
 
 import pytest
 from latex import compile_tables

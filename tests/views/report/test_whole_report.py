@@ -1,4 +1,6 @@
-"""Tests of a whole, short report of real results: sections and synthetic results know the keys that stages store."""
+"""Tests of a short but complete report of real results: sections and synthetic results use the keys that stages
+store.
+"""
 
 import functools
 
@@ -32,7 +34,7 @@ STAGES = PIPELINE["report"].inputs(load().config)
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """The report of the paper's config: two steps, four cells, three rigidities, two cases, two methods."""
+    """Write the report of the paper's config for two steps, four cells, three rigidities, two cases and two methods."""
     with pytest.MonkeyPatch.context() as patch:
         cases = tuple(case for case in package_cases() if case.name in JUDGED)
         assert len(cases) == len(JUDGED)
@@ -72,7 +74,7 @@ def test_every_stage_ran_and_the_page_is_there(run):
 
 def test_every_table_can_be_exported_by_its_caption(run, tmp_path, monkeypatch):
     _, folder, report = run
-    # each export makes all pages again, from the same results
+    # Each export would make all pages again from the same results.
     monkeypatch.setattr(exports, "page_tables", functools.cache(page_tables))
     heads = set()
     for number, caption in enumerate(report.summary["tables"]):
@@ -105,7 +107,7 @@ ON_DEMAND = (
     "check.section",
     "robustness",
     "identification",
-)  # sections of stages that only their own commands run
+)  # sections of stages that run only by their own commands
 
 
 def test_report_excludes_stages_that_only_their_command_runs(results):
@@ -114,7 +116,8 @@ def test_report_excludes_stages_that_only_their_command_runs(results):
     assert [make(results) for make in makers] == [None] * len(makers)
 
 
-NOT_IN_RESULTS = ("figures", "left_out", "recorded")  # drawings, what there is nothing of, and no recorded walk
+# keys of drawings and omissions, and of a recorded walk, which does not exist here
+NOT_IN_RESULTS = ("figures", "left_out", "recorded")
 OF_EVERY_REPORT = [
     make for make in SECTIONS if not make.__module__.endswith(ON_DEMAND) and make.__name__ not in NOT_IN_RESULTS
 ]

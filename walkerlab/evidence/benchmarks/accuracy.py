@@ -11,7 +11,7 @@ import numpy as np
 
 from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
-from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_omissions, plain_power
 from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
 from walkerlab.evidence.benchmarks.trials import (
     USER_SCRIPT,
@@ -54,7 +54,7 @@ class MethodRun:
     walls_s: tuple[float, ...]
 
     def pack(self) -> Numbers:
-        """Return the numbers that `unpack` takes, for a checkpoint."""
+        """Convert the run to numbers for a checkpoint. `unpack` converts them back."""
         run = self.result
         counts = run.rhs_evaluations, run.accepted, run.rejected
         state = run.state.tolist()
@@ -85,7 +85,7 @@ class MethodRow:
     tolerance: Annotated[float, Label("1", "relative tolerance")]
     outcome: Annotated[str, Label("1", "outcome")]
     error: Annotated[float | None, ERROR_LABEL]
-    against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
+    against: Annotated[str, Label("1", "method of the reference end state")]  # always another method
     within_reference: bool  # whether the error is below the reference's uncertainty
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "shortest run time", timing=True)]
@@ -129,7 +129,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
-    # The first walk also loads data into caches, which does not matter for a long walk, so only then does it count.
+    # The first walk also loads data into caches. It counts only if it is so long that this does not matter.
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -187,12 +187,12 @@ OMISSION_OFF_COMPASS = {
     "why": "only the compass has it",
     "saves": "a minute",
 }
-START_RATE_FACTOR = 0.98  # factor on the velocities of the gait: on the gait itself, all steps would be the same
+START_RATE_FACTOR = 0.98  # factor applied to the gait's velocities, because on the gait itself all steps are the same
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Measure every method on every scene. Run times are compared, so no two runs take place at once."""
-    left_out: list[dict[str, Any]] = pinning_left_out(config, "methods")
+    left_out: list[dict[str, Any]] = pinning_omissions(config, "methods")
     if config.contact is not None and not is_passive_compass(config):
         left_out.append(dict(OMISSION_OFF_COMPASS))
     references: dict[str, Reference] = {}
@@ -237,7 +237,7 @@ def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 
 
 def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
-    """Yield the walks for the measurement: rigid, on compliant ground and, for the compass, near the rigid limit."""
+    """Yield the walks to measure: in the rigid model, on compliant ground and, for a compass, on near-rigid ground."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
     start = scale_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
@@ -279,8 +279,8 @@ def summarise(
     }
 
 
-def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Return for each method the fastest run on a scene with an error of at most `level`, the fastest method first."""
+def fastest_runs(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
+    """Return the fastest run of each method on a scene with an error of at most `level`, the fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
@@ -290,7 +290,7 @@ def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[Met
 
 def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
     """Return the fastest method for each error level that some method reaches."""
-    fastest = {plain_power(level): good_enough(rows, scene, level) for level in ERROR_LEVELS}
+    fastest = {plain_power(level): fastest_runs(rows, scene, level) for level in ERROR_LEVELS}
     return {level: runs[0].method for level, runs in fastest.items() if runs}
 
 
@@ -298,14 +298,14 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
     """Return a sentence on which method is fastest at each error level, and by how much it beats the best library."""
     levels = []
     for level in ERROR_LEVELS:
-        runs = good_enough(rows, scene, level)
+        runs = fastest_runs(rows, scene, level)
         family = runs[0].method.split("-")[0] if runs else ""
         libraries = (
             run
             for run in runs
             if run.method.split("-")[0] != family
             and run.method.startswith(("scipy", "cvode"))
-            and run.method != USER_SCRIPT  # the script has its own right-hand side
+            and run.method != USER_SCRIPT  # the script does not use the compiled right-hand side
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

@@ -1,4 +1,4 @@
-"""Conditions of benchmarks: the machine, and a first step that is not pinned. Also formats error levels."""
+"""Conditions under which benchmarks run: the machine, and a first stance foot that is free."""
 
 import os
 import platform
@@ -7,10 +7,10 @@ from typing import Any
 from walkerlab.config.reads import ContactConfig
 
 
-def pinning_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
+def pinning_omissions(config: ContactConfig, measured: str) -> list[dict[str, str]]:
     """Return an omission if the config pins the first stance foot, because measured walks start with both feet free.
 
-    measured  what is measured, in the plural
+    measured  plural noun for what is measured, such as "engines"
     """
     if config.contact is None or config.contact.stance != "pinned":
         return []

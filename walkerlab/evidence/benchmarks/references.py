@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import Numbers
 
 TAYLOR_METHOD = "heyoka-taylor"
-STOPPED_BY_EVENT = -1  # outcome of heyoka after a stop at the first terminal event, but not for failures or time limits
+STOPPED_BY_EVENT = -1  # code of heyoka for a stop at the first terminal event. Failures and time limits have others
 
 
 def has_heyoka() -> bool:
@@ -90,7 +90,7 @@ class End:
     rhs_evaluations: int = 0  # 0 if they are not counted
 
     def pack(self) -> Numbers:
-        """Return the numbers that `unpack` takes, for a checkpoint."""
+        """Convert the end state to numbers for a checkpoint. `unpack` converts them back."""
         return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
 
     @classmethod
@@ -117,12 +117,12 @@ class Reference:
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def reference_for(self, method: str) -> End:
-        """Return the end state with which to compare a method: always that of another method."""
+        """Return the end state with which to compare a method. It was computed by another method."""
         return self.second if method == self.first.method else self.first
 
 
 class WalkEndsError(Exception):
-    """The walk does not reach its last step within the budget, so there is no end state to compare."""
+    """Raised if a walk does not reach its last step within the budget, so that there is no end state to compare."""
 
 
 def reference_for(trial: Trial) -> Reference:

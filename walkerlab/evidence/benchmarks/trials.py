@@ -1,7 +1,7 @@
 """Walks on which methods are measured. Each has a fixed start, a fixed step count and an end state to compare.
 
-One method is a script for the rigid walk, written as a user of NumPy and SciPy would: matrices, a linear solve, an
-event. Contact walks have the contact of the config, or contact near the rigid limit.
+One method is a script for the rigid walk, written as a user of NumPy and SciPy would write it: with matrices, a linear
+solve and an event. Contact walks have the contact of the config, or contact near the rigid limit.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ from walkerlab.scene.contact import contact_scene, start_state
 
 
 class ScriptBudgetError(Exception):
-    """The script has exhausted its budget of right-hand sides."""
+    """Raised if the script has exhausted its budget of right-hand sides."""
 
 
 def walk_as_a_script(
@@ -188,7 +188,7 @@ def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))
 
 
-# factors on stiffness and damping, and on creep velocities, that bring contact near the rigid limit
+# factors for stiffness and damping, and for creep velocities, that bring contact near the rigid limit
 STIFFNESS_FACTOR = 100.0
 CREEP_FACTOR = 0.01
 
@@ -198,7 +198,7 @@ def contact_trial(
 ) -> ContactTrial:
     """Set up the walk with the contact of the config.
 
-    length_m   step length (m) of the rigid gait, also used for that of the contact gait
+    length_m   step length (m) of the rigid gait, which also serves as that of the contact gait
     asymmetry  as in `contact_scene`
     """
     scene = contact_scene(config, length_m, length_m, asymmetry)

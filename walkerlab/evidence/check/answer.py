@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
 
-SAME_ROUTE: Final = 1e-10  # the two routes agree if they differ by less than this, with L and g of 1
+SAME_ROUTE: Final = 1e-10  # both models agree if they differ by less than this, with L and g of 1
 SAME_GAIT: Final = 1e-6  # starts that differ by less than this belong to the same gait
 SMALL_VALUE: Final = 1e-3  # differences are relative for printed values above this, and absolute below
 GAIT_VALUES: Final = (
@@ -48,12 +48,12 @@ def refuse_unknown(check: Check) -> None:
             hint = suggestion(name, known)
             place = ("check", "printed", name)
             raise ConfigError(f"check.printed: a gait has no {name}.{hint}", f"Choose from {', '.join(known)}.", place)
-    for name, texts in states_of(check).items():
+    for name, texts in printed_states(check).items():
         if isinstance(texts, str):
             raise ConfigError(f"check.printed: {name} is one value.", "Give a list of angles and rates.")
 
 
-def states_of(check: Check) -> dict[str, Any]:
+def printed_states(check: Check) -> dict[str, Any]:
     """Return the printed states, by name."""
     states = {"state": check.printed.get("state"), "state_before": check.state_before}
     return {name: texts for name, texts in states.items() if texts}
@@ -77,12 +77,12 @@ class Checked:
     @cached_property
     def items(self) -> list[Item]:
         """All printed numbers, those of states first."""
-        listed = states_of(self.check)
+        listed = printed_states(self.check)
         return items_of({**listed, **self.check.printed}, {name: self.stated(name).names for name in listed})
 
     def stated(self, name: str) -> Convention:
         """Return the convention that the config states for a printed state."""
-        return stated(self.check, len(states_of(self.check)[name]), 3 if self.walker.kneed else 2, name)
+        return stated(self.check, len(printed_states(self.check)[name]), 3 if self.walker.kneed else 2, name)
 
     def numbers(self, name: str) -> list[Item]:
         return [item for item in self.items if item.quantity == name]
@@ -92,7 +92,7 @@ class Checked:
         """Conventions of the printed states, by name."""
         return {
             name: put_feet_on_slope(self.stated(name), self.walker, self.numbers(name))
-            for name in states_of(self.check)
+            for name in printed_states(self.check)
         }
 
     @property
@@ -129,7 +129,7 @@ class Checked:
             start = np.array([*(angle + self.walker.slope for angle in gait.state[:2]), *rates[:2], *extra])
             step = plain.take_step(self.walker, start)
             if step is not None:
-                found[CheckedStep(self.walker, start, step)] = values_of(gait_summary(gait))
+                found[CheckedStep(self.walker, start, step)] = printable_values(gait_summary(gait))
         return found
 
     @cached_property
@@ -185,7 +185,7 @@ class PrintedStep(NamedTuple):
     rounding: Floats  # change of the start that is due to the rounding of the printed state
 
 
-def values_of(summary: Mapping[str, Any]) -> dict[str, Any]:
+def printable_values(summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the printable values of a gait by name, from its summary."""
     values: dict[str, Any] = {name: value for name, value in summary.items() if isinstance(value, int | float)}
     values |= {f"work_per_step_J.{source}": work for source, work in summary["work_per_step_J"].items()}
@@ -222,7 +222,7 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
         periodic["periodic_with"] = find_periodic_changes(question)
     return {
         "source": check.source.model_dump(),
-        "finding": finding_of(rows, explanations),
+        "finding": summarise_verdicts(rows, explanations),
         "conventions": asdict(checked.convention),
         "values": rows,
         "periodic": periodic,
@@ -251,7 +251,7 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
     return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}
 
 
-def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explanation]) -> str:
+def summarise_verdicts(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explanation]) -> str:
     """Summarise the verdicts: reproduced, explained, different without explanation, or not comparable."""
     verdicts = {row["verdict"] for row in rows}
     wrong = {row["name"] for row in rows if row["verdict"] == Verdict.DIFFERENT}
@@ -287,7 +287,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
         "state_after_step": checked.convention.write(walker, plain.full_state(walker, step.after)),
     }
     if checked.convention.origin == "vertical" and checked.convention.instant == "after-strike":
-        # both feet stand on the slope that the legs' angles have
+        # the slope on which both feet stand with the legs at these angles
         answer["slope_rad"] = walker.slope - 0.5 * walker.feet_apart(start)
     return answer
 
@@ -329,9 +329,9 @@ def momenta(checked: Checked, right: CheckedStep) -> list[dict[str, Any]]:
 
 
 def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
-    """Return the change of energy (J) from the printed state just after a strike to that just before the next one.
+    """Return the change of energy (J) between the printed state just after a strike and the one just before the next.
 
-    Return nothing if one of them is not printed.
+    The result is empty if one of them is not printed.
     """
     walker = checked.walker
     if walker.kneed or checked.convention.instant != "after-strike":
@@ -340,7 +340,7 @@ def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
     end = checked.printed_state("state_before", right.step.before)
     if start is None or end is None:
         return {}
-    return {"energy_drift_J": walker.energy(end[0]) - walker.energy(start[0])}
+    return {"energy_drift_J": plain.energy(walker, end[0]) - plain.energy(walker, start[0])}
 
 
 def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
@@ -361,7 +361,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
-    """Compare both routes: in the plain model, the gait of the compiled model must return to itself after a step."""
+    """Compare both models: in the plain model, the gait of the compiled model must return to itself after a step."""
     unit = plain.scales(gait.walker, len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())

@@ -59,7 +59,7 @@ OFFER = Offer(check, ("config", "sets", "as_json", "quiet", "verbose"))
 
 
 def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the configs among the paths, and those in the folders among them.
+    """Yield each path that is a config, and the configs in each path that is a folder.
 
     Raises ConfigError for a folder without configs.
     """

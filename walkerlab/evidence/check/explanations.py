@@ -34,7 +34,7 @@ SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this 
 FITTING_ROUNDS, MIN_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # a round size is tried if it is this close to the fitted one (relative)
-MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all of them
+MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all if fewer are printed
 MUCH_CLOSER = 5.0  # a cause must bring gaits this many times closer to be reported
 READINGS = 3  # number of other conventions in which we search for mistakes
 # conventions that miss by up to this many times as much as the nearest one are ranked by their number of changes
@@ -84,7 +84,7 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
 def list_misprints(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
     """Return the values that may have been misprinted as `value`, each with a description of the misprint.
 
-    values  parameters of the config, one of which may have been printed for another
+    values  parameters of the config, one of which may have been printed in place of another
     """
     unit = UNIT.findall(key)
     found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
@@ -193,7 +193,7 @@ class Question:
         return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
-        """Return a first guess of a walker's gait, by a Newton step from the printed state or, if none, the right gait.
+        """Return a first guess of a walker's gait: a Newton step from the printed state or, without it, the right gait.
 
         Return None if that leads nowhere.
         """
@@ -254,10 +254,10 @@ def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[
 
 
 def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions that fit the printed values better than the stated one, and the question in each of them.
+    """Yield conventions that fit the printed values better than the stated one, each with the question restated in it.
 
-    A convention must bring the right gait much closer to the printed values. If it puts both feet on the slope and the
-    stated one does not, closer is enough.
+    A convention must bring the right gait much closer to the printed values, or at least closer if it puts both feet on
+    the slope and the stated one does not.
     """
     if question.state is None:
         return
@@ -294,7 +294,7 @@ def find_closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, A
 
 
 def attempt_all(question: Question) -> Iterator[Attempt]:
-    """Yield the most promising candidates and then mistakes of fitted size, each with its gait."""
+    """Yield the most promising candidates, then mistakes with a fitted size, each with its gait."""
     right = question.guess(question.walker)
     guesses = []
     mistakes = [*plain.list_mistakes(question.walker)]
@@ -422,7 +422,7 @@ def list_right_gaits(question: Question) -> Iterator[tuple[str, CheckedStep]]:
 def find_misprinted_value(question: Question) -> Iterator[Explanation]:
     """Yield the explanation that one value has a wrong sign or two exchanged digits.
 
-    All other values must be right. Multipliers do not count.
+    All other values must be right, except for multipliers, which do not count.
     """
     items = [item for item in question.items if item.quantity != "multipliers"]
     values = question.right.values(items, question.convention)

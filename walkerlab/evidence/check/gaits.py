@@ -52,7 +52,7 @@ CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
         **{f"{gravity:g}": f"gravity is {gravity:g} m/s²" for gravity in GRAVITIES},
     }),
 }  # fmt: skip
-"""Choices that make up a convention: for each, a clause about it, and the words that its values put in there."""
+"""Choices that make up a convention. Each has a clause with a gap and, for each value, the words that fill the gap."""
 BEFORE: Instant = "before-strike"
 Values = dict[str, complex | None]
 """Values of printed numbers by name, or None for a number that the gait does not have."""
@@ -95,7 +95,7 @@ class Convention:
         return K * (1.0 if self.positive == "counter-clockwise" else -1.0) * (RAD_IN_DEG if self.unit == "deg" else 1.0)
 
     def arrange(self, pairs: NDArray[Any]) -> list[Any]:
-        """Return a list in printed order of angles and rates (2, bodies), or of their names."""
+        """Return angles and rates (2, bodies), or their names, as a list in the printed order."""
         return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
 
     @property
@@ -318,7 +318,7 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> Ch
                 return best
             slow = size > SLOW_RATIO * last
             last = size
-        # Rounding ends the progress of a search that has succeeded.
+        # A search this close to its goal has succeeded: only rounding keeps it from coming closer.
         elif best is None or last < MAX_RESIDUAL:
             return best
         elif is_own:

@@ -52,8 +52,8 @@ REDUCTIONS: Final = {
     STRAIGHT: np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5], [0.0, 1.0]]),
     BENT: np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]),
 }
-"""Matrices (bodies, coordinates), by phase, from the rates of the coordinates to those of all bodies: swing leg or its
-thigh, stance leg, swing shank, torso, and the ground on which the stance foot rolls."""
+"""Matrices (bodies, coordinates), by phase, that map the rates of the coordinates to those of all bodies: swing leg or
+its thigh, stance leg, swing shank, torso, and the ground on which the stance foot rolls."""
 
 
 class LegPart(NamedTuple):
@@ -69,12 +69,12 @@ NO_PART: Final = LegPart(0.0, 0j, 0.0)
 
 @dataclass(frozen=True)
 class PlainWalker:
-    """A walker on its slope, and the mistakes in its equations. SI units."""
+    """A walker on its slope, with the mistakes in its equations, if there are any. SI units."""
 
     parts: tuple[LegPart, LegPart]  # parts of one leg: thigh and shank, or the whole leg and NO_PART
     knee: complex  # m, from hip to knee, or 0 for straight legs
     hip_mass: float
-    foot: complex  # m, from hip to the centre of the foot's arc, leg upright
+    foot: complex  # m, from hip to the centre of the foot's arc, for an upright leg
     radius: float
     gravity: float
     slope: float
@@ -84,14 +84,14 @@ class PlainWalker:
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
     knee_damping: float = 0.0  # N m s/rad, while the knee is free
     # mistakes
-    signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors on velocity terms, by phase
+    signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors for velocity terms, by phase
     keeps_trailing_rate: bool = False
-    # weights of trailing and leading rate in an extra term I * rate of the strike's balance
+    # weights of the trailing and the leading leg's rates in the extra term I * rate of the balance at a strike
     extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
     # whether the trailing leg turned about the same point of its foot before the strike
     turned_about_strike_foot: bool = False
-    strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
+    strike_inertia: float = 1.0  # factor applied to the legs' inertia in the strike
     window: float = 0.0  # rad, how early a touch is accepted
     euler_step: float = 0.0  # s, step of Euler's method, or 0 for exact integration
     interpolates: bool = True  # whether Euler's method finds the strike between two steps
@@ -163,15 +163,15 @@ class PlainWalker:
 
     @cached_property
     def factors(self) -> dict[str, Floats]:
-        """Factors (bodies, bodies) on the velocity terms, by phase: 1, or -1 for a mistake in a sign.
+        """Factors (bodies, bodies) for the velocity terms, by phase: 1, or -1 for a mistake in a sign.
 
-        The factor of the rolling is 0, because its lever does not turn.
+        The factor for rolling is 0, because the lever of a rolling foot does not turn.
         """
         factors = {phase: np.repeat([[1.0, 1.0, 1.0, 1.0, 0.0]], 5, axis=0) for phase in REDUCTIONS}
         for (phase, row, column), factor in self.signs.items():
             factors[phase][row, column] = factor
         for table in factors.values():
-            table[ROLLING] = table[STANCE]  # the stance leg's equation has both rows
+            table[ROLLING] = table[STANCE]  # both rows belong to the equation of the stance leg
         return factors
 
     def bodies(self, phase: str, state: Floats) -> Floats:
@@ -204,30 +204,31 @@ class PlainWalker:
         return -1j * self.gravity * cmath.exp(1j * self.slope)
 
     def swing_foot(self, state: Floats) -> complex:
-        """Return the position of the swing foot relative to the stance foot (arc centres, swing leg straight)."""
+        """Return the vector from the arc centre of the stance foot to that of the swing foot, for straight legs."""
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return the sum (rad) of the angles of both legs, from hip to foot, less the window. It is 0 at a touch."""
+        """Return the sum (rad) of both legs' angles minus the window, which is 0 at a touch."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
         """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
-    def energy(self, state: Floats) -> float:
-        """Return kinetic plus potential energy (J).
 
-        Heights are measured from the point where an upright stance leg touches the slope.
-        """
-        angles, omega = self.bodies(STRAIGHT if len(state) == 4 else BENT, state)
-        places = self.levers * np.exp(1j * angles)
-        heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
-        return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
+def energy(walker: PlainWalker, state: Floats) -> float:
+    """Return kinetic plus potential energy (J).
+
+    Heights are measured from the point where an upright stance leg touches the slope.
+    """
+    angles, omega = walker.bodies(STRAIGHT if len(state) == 4 else BENT, state)
+    places = walker.levers * np.exp(1j * angles)
+    heights = (places.sum(axis=1) - walker.radius * state[STANCE]) * np.conj(walker.down)
+    return float(0.5 * omega @ walker.mass_matrix(places, walker.inertias) @ omega - walker.masses @ heights.real)
 
 
 def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
-    """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
+    """Convert coordinates with a straight swing leg to the angles and then the rates of all bodies."""
     if not walker.kneed:
         return coordinates[:4]
     shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
@@ -235,7 +236,7 @@ def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
 
 
 def coordinates(walker: PlainWalker, state: Floats) -> Floats:
-    """Return the coordinates just after a heel strike from the state of all bodies."""
+    """Convert the state of all bodies just after a heel strike to coordinates."""
     n = len(state) // 2
     return np.concatenate((state[:2], state[n : n + 2 + int(walker.kneed and walker.free_at_strike)]))
 
@@ -255,9 +256,9 @@ def name_balances(walker: PlainWalker) -> tuple[str, ...]:
 
 
 def strike_balances(walker: PlainWalker, before: Floats) -> tuple[Floats, Floats]:
-    """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
+    """Return the matrix and the right-hand side of the balances that determine the rates just after a heel strike.
 
-    before  state just before the strike, swing leg straight
+    before  state just before the strike, with a straight swing leg
     """
     Z = REDUCTIONS[BENT if walker.free_at_strike else STRAIGHT]
     old_angles, old = walker.bodies(STRAIGHT, before)
@@ -318,7 +319,7 @@ class Piece(NamedTuple):
 
 
 class PlainStep(NamedTuple):
-    """A step of a plain walker, SI units."""
+    """A step of a plain walker, in SI units."""
 
     period: float
     length: float
@@ -502,7 +503,8 @@ class Mistake(NamedTuple):
     what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
     of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
     first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
-    limits: tuple[float, float] = (0.0, 0.0)  # smallest and largest size: smaller ones hide in errors of a program
+    # smallest size (a smaller mistake hides in the errors of a program) and largest size
+    limits: tuple[float, float] = (0.0, 0.0)
 
 
 def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
@@ -550,7 +552,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield the velocity terms in the equations of motion whose signs may be wrong together, with a description."""
+    """Yield groups of velocity terms in the equations of motion that may share a wrong sign, and describe them."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}

@@ -16,7 +16,7 @@ UNEXPLAINED = "different, unexplained"
 # A value counts as reproduced if at least this many of its digits agree, and at least half of them.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
-"""Numerical error of right values by quantity, as in `EXACT_ERROR`, which holds for all other quantities."""
+"""Numerical errors of right values, by quantity. `EXACT_ERROR` is that of all other quantities."""
 EXACT_ERROR = 2e-12  # numerical error of right values, absolute below 1 and relative above
 MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
 MOST_DECIMALS: Final = 12

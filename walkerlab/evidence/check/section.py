@@ -17,7 +17,7 @@ TONES: Mapping[str, Tone] = {
     Verdict.DIFFERENT: "bad", Verdict.NOT_REPRODUCED: "plain", Verdict.NOT_COMPARABLE: "plain",
 }  # fmt: skip
 """Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
-MANY_UNITS = 1e5  # a difference of more units of the last digit is not shown
+MANY_UNITS = 1e5  # a larger difference, in units of the last digit, is not shown
 LONGEST_LIST = 2  # longer states are mentioned as a whole, if they are complete
 COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
@@ -122,7 +122,7 @@ def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
 
 
 def remarks(summary: Row) -> Iterator[str]:
-    """Yield sentences about explanations, periodicity, momenta, the nearest gait and the two routes."""
+    """Yield sentences about explanations, periodicity, momenta, the nearest gait and the agreement of both models."""
     rows = summary["values"]
     explanations = summary["explanations"]
     if len(explanations) > 1:

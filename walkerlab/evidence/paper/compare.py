@@ -63,7 +63,7 @@ def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | 
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Return the times (s) of a walk's steps, or nothing if they were not stored."""
+    """Return the times (s) of the steps of a walk. The array is empty if they were not stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
@@ -79,7 +79,7 @@ def motion_of(walk: Content) -> comparison.Motion | None:
     trajectory = walk["trajectory"]
     strikes = times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
-    # Where a knee does not lock, the time is NaN, which is not above 0.
+    # If a knee did not lock, its time is NaN. The comparison drops it, because NaN is not above 0.
     motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
     return comparison.add_strike_samples(motion)
 
@@ -164,7 +164,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Compare the recorded walk with both models, and return groups and summary. Both are empty without a recording."""
+    """Compare the recorded walk with both models. Return groups and summary, which are empty without a recording."""
     recorded = inputs.get("recorded-walk")
     if recorded is None:
         return {}, {}
@@ -243,7 +243,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 
 def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    """Summarise a walk: outcome, last step with knee strike, and energy dissipated per step by channel."""
+    """Summarise a walk: its outcome, its last step, and the energy dissipated per step by channel."""
     steps = walk.steps
     lost = losses_by_channel(scene.walker, walk.dissipated_J)
     return {
@@ -335,7 +335,7 @@ def compare_with_paper(
 
 
 def summarise_models(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
-    """Summarise the walks of both models and, for kneed walkers, the walks with each knee release."""
+    """Summarise the walks of both models and, for kneed walkers, those for each moment of releasing the knee."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
     step_of = mean_step if have_different_legs(config) else last_step

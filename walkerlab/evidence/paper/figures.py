@@ -1,4 +1,4 @@
-"""Figures on the paper's claim: the difference between the walks of both models (8), and the rigid limit (12)."""
+"""Figures on the paper's claim: difference between the walks of both models (figure 8), and rigid limit (figure 12)."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,7 +21,7 @@ AXIS_MARGIN = 3.0
 ZERO_CROSSING = 1e-3
 """Smallest error shown, as a fraction of the largest. Where the difference changes sign, errors fall to zero."""
 LEG_QUANTITIES = (("a", "angle", "angle_error_rad"), ("b", "angular velocity", "velocity_error_rad_s"))
-"""Compared quantities: letter of the panel, name, and NAME of the error, stored as raw_NAME and as aligned_NAME."""
+"""Compared quantities: letter of the panel, words for the title, and NAME of the stored raw_NAME and aligned_NAME."""
 RAW_ERRORS = Need(
     walks.COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), walks.NO_STATES
 )

@@ -170,7 +170,7 @@ class Measured:
 
     @property
     def raised(self) -> list[float | None]:
-        """How much larger (%) each coordinate of the contact model's start is than that of the rigid gait."""
+        """By how much (%) each coordinate of the contact model's start exceeds that of the rigid gait."""
         gait = self.models.get(self.equations)
         start = self.contact.start
         if gait is None or start is None:

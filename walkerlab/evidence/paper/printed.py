@@ -32,7 +32,7 @@ class Printed(PrintedNumber):
 
     @property
     def rounding(self) -> tuple[float, float]:
-        """Smallest and largest value that are rounded to the printed one."""
+        """Smallest and largest value that round to the printed one."""
         half = 0.5 * self.digits.unit
         return self.value - half, self.value + half
 
@@ -173,14 +173,14 @@ def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
 
 
 def softening_in_metres() -> float:
-    """Return by which factor an ADAMS default of the stiffness is lower in metres than in millimetres."""
+    """Return the factor by which a default stiffness of ADAMS is lower in a model in metres than in millimetres."""
     return float(MM_PER_M ** (Contact().exponent - 1.0))
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
     """Return how a foot rests on the ground for three readings of Fig. 4b.
 
-    They are in N, mm and s, in SI, and as the defaults of an ADAMS model in metres.
+    Its values are read in N, mm and s, in SI, and as the defaults of an ADAMS model in metres.
 
     Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.
@@ -206,7 +206,7 @@ def contradictions() -> MappingProxyType[Printed, str]:
 
 
 def interval(function: Callable[..., float], *entries: Printed) -> Interval:
-    """Return the range of a function over all values that are rounded to the printed ones.
+    """Return the range of a function over all values that round to the printed ones.
 
     The function must be monotonic in each argument.
     """
@@ -277,7 +277,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
 
 
 def start_error() -> tuple[Printed, str]:
-    """Return the largest error, which is printed as smaller than the difference between the two starts."""
+    """Return the largest error as printed, and the reason why it is wrong: the two starts alone differ by more."""
     angle, rate = (max(abs(row.adams.value - row.matlab.value) for row in rows) for rows in (TABLE_2[:2], TABLE_2[2:]))
     return LARGEST_ERROR, (
         f"the two starts of Table 2 alone differ by {angle:.4f} rad and {rate:.2f} rad/s, "

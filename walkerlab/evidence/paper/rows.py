@@ -27,7 +27,7 @@ VERDICTS = (
 )
 """Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
-"""A mismatch counts if this model has the paper's scene. With "any" it always does: the printed values decide."""
+"""A mismatch counts only if this model has the paper's scene. With "any" it always counts: printed values decide."""
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:

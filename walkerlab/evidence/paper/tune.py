@@ -222,7 +222,7 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """Build a group for each series: its settings, and how far the gait and, if compared, the walk are from rigid."""
+    """Build a group for each series: its settings, and how far gait and, if compared, walk are from the rigid ones."""
     groups = {}
     for name, rows in findings.series.items():
         complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]
@@ -369,7 +369,7 @@ class TuneRun:
     def take(self, name: str, state: State) -> None:
         """Simulate and record a walk of the procedure, with its numerical error unless the solver failed.
 
-        name  its key in `walks`
+        name  key of the walk in `walks`
         """
         walk = self.walks[name] = self.walk(state, name == "hinged")
         report = self.printed[name] = walk_summary(walk)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from walkerlab.config.analyses import FATES, Case, Fate
+from walkerlab.config.drives import HINGE_PARAMETERS
 from walkerlab.config.fields import Block, annotation_of, replace_key
 from walkerlab.config.loader import paper_config_with
 from walkerlab.config.reader import read
@@ -21,6 +22,7 @@ from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 from walkerlab.physics.orbits.similarity import Units
+from walkerlab.scene.laws import hinge_law_of
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
 UNIQUE_NAME_ADVICE: Final = "Give each case a unique name."
@@ -83,7 +85,7 @@ def config_of(case: Case) -> Config:
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """Return the cases of a scene with their configs, for the rigid model and, if the scene has contact, for both.
+    """Return the cases of a scene with their configs, for both models or, without contact, only for the rigid one.
 
     config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """
@@ -148,29 +150,32 @@ def to_twin(config: RigidConfig) -> Units:
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
-def scaled_block(block: B, by: Units) -> B:
-    """Return the block with each value scaled according to the unit of its key."""
+def scale_block(block: B, by: Units, special: Mapping[str, float]) -> B:
+    """Return the block with each value scaled according to the unit of its key, or by its entry in `special`."""
 
     def value(quantity: Any, unit: float) -> Any:
         if isinstance(quantity, Block):
-            return scaled_block(quantity, by)
+            return scale_block(quantity, by, special)
         if isinstance(quantity, tuple):
             return tuple(value(item, unit) for item in quantity)
         return quantity * unit if isinstance(quantity, float) and unit != 1.0 else quantity
 
     values: dict[str, Any] = {}
     for name, field in type(block).model_fields.items():
-        values[name] = value(getattr(block, name), by.natural_unit(annotation_of(field, "unit")))
+        unit = special.get(name) or by.natural_unit(annotation_of(field, "unit"))
+        values[name] = value(getattr(block, name), unit)
     return block.model_copy(update=values)
 
 
-def scaled(config: Config, by: Units) -> Config:
+def scale_config(config: Config, by: Units) -> Config:
     """Return the config of a similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
-    walker = scaled_block(config.walker, by)
+    # A law of an extension may give its parameters units of its own. Hip and knees name them alike.
+    law_units = hinge_law_of(config.walker).units(by.energy, by.time)
+    walker = scale_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True)))
     changes: dict[str, object] = {
         "walker": walker,
         "gravity_m_s2": config.gravity_m_s2 * by.length / by.time**2,
-        "push_off": scaled_block(config.push_off, by),
+        "push_off": scale_block(config.push_off, by, {}),
     }
     if not isinstance(config.start, str):
         state = state_of(config.start)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def cases_config(config: reads.SceneConfig) -> type:
-    """Return the type of config that `stability` takes: less for the walker of a study than for any other scene."""
+    """Return the slice of the config that `stability` reads. For the walker of a study it is smaller."""
     return reads.CompassCasesConfig if is_studied(config) else reads.SceneCasesConfig
 
 
@@ -27,7 +27,7 @@ def paper_walks(_config: object) -> dict[str, Any]:
 
 
 def known_problems_and_start(config: reads.SceneConfig) -> tuple[str, ...]:
-    """Return the required stages: `known-problems` and, outside the studies, those of `gait_for_start_or_pads`."""
+    """Return the required stages: `known-problems` and, outside the studies, those that find a gait if it is needed."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 

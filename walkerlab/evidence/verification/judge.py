@@ -1,4 +1,4 @@
-"""Judgement of cases, and ordinary methods on the same cases.
+"""Judge the walks of cases, and try ordinary methods on the same cases.
 
 Each walk is repeated with a ten times tighter tolerance, with another method and for a scaled twin of the walker.
 
@@ -24,7 +24,7 @@ from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.trials import walk_as_a_script
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.evidence.paper.walker import compass_or_none
-from walkerlab.evidence.verification.catalogue import config_of, pendulum_time, scaled, to_twin
+from walkerlab.evidence.verification.catalogue import config_of, pendulum_time, scale_config, to_twin
 from walkerlab.evidence.verification.starts import (
     ContactStart,
     JudgedWalk,
@@ -282,7 +282,7 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
     if case.twin:
         scale = to_twin(config)
         twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
-        twin = prepare_start(scaled(config, scale), twin_case)
+        twin = prepare_start(scale_config(config, scale), twin_case)
         if twin is not None:
             again.append(("the walk of the twin", twin.walk(case, case_tolerances(twin, case))))
     return again

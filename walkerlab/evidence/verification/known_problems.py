@@ -1,4 +1,4 @@
-"""Stage `known-problems`: solve problems with known answers with the contact code. The scene does not matter."""
+"""Stage `known-problems`: test the contact code on problems with known answers. The scene does not matter."""
 
 import math
 import time

@@ -55,7 +55,7 @@ def gave_up(row: Row) -> bool:
     return outcome is not None and not outcome.answered
 
 
-def ending(row: Row) -> Cell:
+def outcome_cell(row: Row) -> Cell:
     """Return the table cell with the outcome of a case. It is green only if an answer was expected and found."""
     return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
@@ -73,7 +73,7 @@ def worst_measure(row: Row) -> float | None:
 
 CASE_COLUMNS = (
     Column("case", "name"),
-    Column("ended as", ending),
+    Column("ended as", outcome_cell),
     Column("steps", "steps", format_integer, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
     Column("worst measure / limit", worst_measure, partial(number, digits=2), numeric=True),

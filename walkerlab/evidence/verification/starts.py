@@ -132,7 +132,7 @@ class SwingMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def share_of(self, leg: int) -> Floats:
-        """Return the fraction of each body that belongs to a leg (bodies,). Only coupled bodies belong in part."""
+        """Return the fraction of each body that belongs to a leg (bodies,): 0 or 1, except for coupled bodies."""
         names = [body.name for body in self.assembly.bodies]
         of_leg = self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])
@@ -307,7 +307,7 @@ def split(times: Floats, coarse: NDArray[np.bool_]) -> Floats:
 def impulse(times: Floats, rate: Floats) -> Floats:
     """Integrate a rate (times, components) by Simpson's rule from the start to each end of an interval.
 
-    Returns (ends, components).
+    The result has the shape (ends, components).
 
     times  ends and midpoints of the intervals, in ascending order
     """
@@ -317,7 +317,7 @@ def impulse(times: Floats, rate: Floats) -> Floats:
 
 
 def integration_errors(times: Floats, rate: Floats) -> Floats:
-    """Estimate the error of each interval by Simpson's rule minus the midpoint rule, in the worst component."""
+    """Estimate the error of each interval, in the worst component, as Simpson's rule minus the midpoint rule."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))
@@ -435,7 +435,7 @@ class RigidStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
-        """Check that at heel strikes feet land on the slope, momentum is conserved and energy does not grow."""
+        """Check that at every heel strike the foot is on the slope, momentum is conserved and energy does not grow."""
         record: RigidWalkResult = walk.record
         if not record.steps:
             return []
@@ -502,7 +502,7 @@ def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerance
 
 @cache
 def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
-    """Find the gait of a walker. Most cases of a catalogue differ only in the ground, so it is cached."""
+    """Find the gait of a walker. Gaits are cached, because most cases of a catalogue differ only in the ground."""
     return find_gaits(walker, seed).gait
 
 

@@ -28,8 +28,8 @@ from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 25
-# From this round on, heights are averaged with those of the round before, and the noise keeps its value unless the
-# likelihood rises by at least MIN_LIKELIHOOD_GAIN: otherwise two estimates could lead to each other forever.
+# From this round on, heights are averaged with those of the previous round, and the noise changes only if the
+# likelihood rises by at least MIN_LIKELIHOOD_GAIN. Otherwise two estimates could lead to each other forever.
 FREE_ROUNDS: Final = 10
 MIN_LIKELIHOOD_GAIN: Final = 3.0
 # A standard deviation has converged when it changes by less than this (relative), or when the restricted
@@ -39,14 +39,14 @@ LIKELIHOOD_TOLERANCE: Final = 1e-2
 # largest change of a converged unknown, in standard errors
 MOVE_TOLERANCE: Final = 0.1
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
-# smallest noise, as a fraction of a quantity's typical size. Noise-free measurements count as this noisy
+# smallest noise, as a fraction of a quantity's typical size; measurements without noise count as this noisy
 NOISE_FLOOR: Final = 1e-6
 NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 # a round ends when the cost or the unknowns change by less than this (relative)
-FIT_TOLERANCE: Final = 1e-6
-SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
+FIT_TOLERANCE: Final = 1e-4
+SAME_DERIVATIVES: Final = 0.1  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # standard deviation of a weak prior on each scaled unknown, which keeps undetermined combinations near the start
 WEAK_PRIOR: Final = 1.0
@@ -60,10 +60,10 @@ class FitProblem:
     leg_length_m: float
     start: tuple[float, ...]  # initial values of the parameters, in their units
     bounds: Sequence[Sequence[float]]  # (low, high) of each parameter, infinite where unbounded
-    # (value, standard deviation) of parameters with prior knowledge, by index, in their units
+    # prior knowledge: (value, standard deviation) by index of the parameter, in its unit
     priors: Mapping[int, Sequence[float]] = field(default_factory=dict)
     loss: Loss = "linear"
-    max_walks: int = 10_000  # predicted walks after which the search ends
+    max_walks: int = 10_000  # number of predicted walks after which the search ends
 
     @cached_property
     def floors(self) -> Floats:
@@ -98,7 +98,7 @@ class FitProblem:
 
 
 class FitEnd(Enum):
-    """How a fit ended. If it did not converge, the value is the reason, with {} for the maximum number of walks."""
+    """How a fit ended. If it did not converge, the value states the reason, with {} for the maximum number of walks."""
 
     CONVERGED = ""
     STILL_CHANGES = "standard deviations still change"
@@ -112,6 +112,7 @@ class Fitted:
     u: Floats  # (unknowns,) scaled unknowns
     disturbances: Floats  # (heights + kicks,) most probable floor heights (m) and kicks
     noise: Noise
+    noises: tuple[Noise, ...]  # likeliest noise for each set of disturbances, see `Reduced.disturbance_sets`
     evaluation: Evaluation
     data: Linearised
     predicted: Prediction  # walk over even ground, from the most probable start
@@ -165,13 +166,14 @@ def fit(
     if data is None:
         return None
     robust = None
+    noises: tuple[Noise, ...] = ()
     for done in range(rounds):
         on_round()
         before = u
         u = least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, disturbances, robust=robust)
         if data is None:
-            # The data pull the walker out of its basin of attraction. The last completed walk is judged instead.
+            # The data pull the walker out of its basin of attraction, so judge the last walk that was completed.
             u = before
             end = FitEnd.WALK_FAILS
             data = linearise(problem, u, disturbances, robust=robust)
@@ -179,7 +181,7 @@ def fit(
             return None
         rows = reduce(data)
         earlier = noise
-        noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
+        noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, noise, noises)
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
             noise = average_noise(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation = evaluate(rows, noise)
@@ -191,25 +193,28 @@ def fit(
         if end is FitEnd.WALK_FAILS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
-        moved = float(np.max(np.abs(u - before) / errors))
+        # The next round would start with this move. It may stop at a bound.
+        ahead = np.clip(u + evaluation.move, *problem.limits()) - u
+        moved = min(float(np.max(np.abs(each) / errors)) for each in (u - before, ahead))
         if moved < MOVE_TOLERANCE and noise_has_converged(rows, earlier, noise, problem.leg_length_m):
             end = FitEnd.CONVERGED
             break
         if forecast.walks_taken > problem.max_walks:
             end = FitEnd.OUT_OF_WALKS
             break
-    # The errors follow from these derivatives, so compute them exactly, unless a slightly changed walk ends early.
+    # The errors follow from these derivatives, so compute them accurately, unless a slightly changed walk ends early.
     data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return None
-    return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, end)
+    return Fitted(problem, u, disturbances, noise, noises, evaluate(reduce(data), noise), data, predicted, end)
 
 
 def refit(problem: FitProblem, start: Floats, like: Fitted) -> Fitted | None:
-    """Fit another problem to the walk that `like` fits, from a start (unknowns,).
+    """Fit another problem to the walk that `like` was fitted to, from a start (unknowns,).
 
-    The unknowns are fitted with the noise of `like`, then the standard deviations. Returns None if a walk ends early.
+    First the unknowns are fitted with the noise of `like`, then the standard deviations. Returns None if a walk ends
+    early.
     """
     data = linearise(problem, start, like.disturbances, robust=robust_scatter(like.rows, like.noise))
     if data is None:
@@ -229,16 +234,14 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     if data is None or predicted is None:
         return None
     rows = reduce(data)
-    noise = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise)
+    noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise, like.noises)
     evaluation = evaluate(rows, noise)
     disturbances = most_probable_disturbances(rows, noise, evaluation.move)
-    return replace(
-        like, u=u, disturbances=disturbances, noise=noise, evaluation=evaluation, data=data, predicted=predicted
-    )
+    return Fitted(problem, u, disturbances, noise, noises, evaluation, data, predicted, like.end)
 
 
 def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
-    """Return the heights, or a fraction of them if the walk over the full heights ends early."""
+    """Return the heights, scaled down if the walk over the full heights ends early."""
     shares = (share for share in HEIGHT_SHARES if problem.forecast.predict(u, share * heights) is not None)
     return next(shares, 0.0) * heights
 
@@ -278,7 +281,7 @@ def linearise(
     """Linearise the prediction at u (unknowns,) and the disturbances, or return None if a walk ends early.
 
     disturbances  heights (m), then any known kicks. The walk is predicted over these heights but without kicks
-    robust        scatter for trimming the residuals with a robust loss, or None to leave them unchanged
+    robust        scatter with which a robust loss trims the residuals, or None to leave them unchanged
     """
     forecast = problem.forecast
     heights = disturbances[: problem.forecast.heights]
@@ -299,7 +302,8 @@ def linearise(
 
 
 def compute_pseudo_residuals(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
-    """Return pseudo-residuals (values,). Least squares on them gives what the soft_l1 loss gives on the residuals.
+    """Return pseudo-residuals (values,), with which least squares gives the same result as the soft_l1 loss with the
+    residuals.
 
     With the loss's derivative psi(x) = x / sqrt(1 + x^2) of residuals in units of their scatter, least squares on
     psi / mean(psi') has the fixed point and the covariance of the robust fit; another factor corrects for short walks.
@@ -320,7 +324,7 @@ class Robust(NamedTuple):
     """Scatter of each quantity, and the share of its noise that the fit absorbs, for a robust loss."""
 
     scatter: Floats  # (quantities,) standard deviation of values without outliers
-    absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
+    absorbed: Floats  # (quantities,) share of the variance of the noise that the fitted unknowns and floor absorb
 
 
 def robust_scatter(rows: Reduced, noise: Noise) -> Robust:
@@ -341,11 +345,11 @@ def least_squares_fit(
     problem: FitProblem, u: Floats, start: Floats, heights: Floats, data: Linearised, noise: Noise
 ) -> Floats:
     """Minimise the whitened residuals over the unknowns, reusing the derivatives in `data` near u."""
-    from scipy.optimize import least_squares  # takes a third of a second, only needed here
+    from scipy.optimize import least_squares  # This import takes a third of a second and is needed only here.
 
     forecast = problem.forecast
     low_high = problem.limits()
-    # SciPy refuses a start on a bound, where the last round may have ended.
+    # SciPy refuses a start on a bound, but the last round may have ended there.
     inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
     whiten = whitening(data, noise)
     # Derivatives cost one walk per parameter, so the last ones serve as long as the unknowns have hardly moved.

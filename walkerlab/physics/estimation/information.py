@@ -16,27 +16,28 @@ from walkerlab.physics.estimation.mixed_model import (
     Noise,
     evaluate,
     noise_at,
-    noise_by_disturbances,
     whitening,
 )
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
-"""Singular value below which a parameter combination is undetermined: changes by its scale are lost in the noise."""
-# fraction of the largest singular value below which a parameter combination counts as having no effect at all
+"""A parameter combination with a singular value below this is undetermined, because changes by its scale are lost in
+the noise.
+"""
+# A combination whose singular value is below this fraction of the largest one counts as having no effect at all.
 LOST_SHARE: Final = 1e-7
 NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
 # largest distance below and above the most likely value, in the logarithm of a standard deviation
 FARTHEST_NOISE: Final = (3.0, 1.5)
-# a parameter is named if its component in an undetermined direction is at least this, or if the direction moves it by
-# more than its standard error
+# A parameter is named if its component in an undetermined direction is at least this large, or if the direction moves
+# it by more than its standard error.
 LOADED: Final = 0.1
 
 
 def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
-    """Return a fit's information about its parameters."""
+    """Return the information that a fit gives about its parameters."""
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
     scales = fitted.forecast.scales
     plain = information_from(fitted.evaluation.information, keys, scales, values_count)
@@ -44,7 +45,8 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     result = replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
     groups = fitted.forecast.half_steps
     if not groups.size:
-        # Floor and kicks move the estimates by different amounts, and a short walk hardly shows which of them acted.
+        # A short walk hardly shows whether floor or kicks disturbed it, and both have different effects on the
+        # estimates.
         average = average_covariance(fitted, likely_noises(fitted), basis)
         root = np.linalg.cholesky(basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T)
         inverse = np.linalg.inv(root)
@@ -61,9 +63,9 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
 
     along  (unknowns, n)
 
-    Errors of successive angles may be correlated. Only those of different half steps, or legs, count as independent.
-    This is the sandwich estimator with jackknifed groups (CR3), where it is larger than the covariance of independent
-    errors. Without angles over time, all errors are independent.
+    Errors of successive angles may be correlated, so only those of different half steps or legs count as independent.
+    The covariance is that of the sandwich estimator with jackknifed groups (CR3) in directions in which it is larger
+    than the covariance of independent errors. Without angles over time, all errors are independent.
 
     Source: Bell and McCaffrey, Survey Methodology 28 (2002).
     """
@@ -80,7 +82,7 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
     meat = root.T @ fitted.rows.prior[1:, 1:] @ root
     count = groups.max() + 1
     for rows in (groups == group for group in range(count)):
-        # The fit has followed the residuals of this group. The matrix undoes that.
+        # The fit has followed the residuals of this group, so they are too small. The matrix corrects this.
         score = np.linalg.solve(np.eye(len(meat)) - J[rows].T @ J[rows], J[rows].T @ residuals[rows])
         meat += (1.0 - 1.0 / count) * np.outer(score, score)
     return widen(root, meat)
@@ -94,7 +96,7 @@ def widen(root: Floats, meat: Floats) -> Floats:
 
 
 def scale_covariance(covariance: Floats, scales: Floats) -> dict[str, Any]:
-    """Return the covariance of the parameters from that of the scaled parameters, and the correlations."""
+    """Convert the covariance of scaled parameters to that of the parameters. Also return their correlations."""
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return {"covariance": covariance * np.outer(scales, scales), "correlations": covariance / np.outer(errors, errors)}
 
@@ -151,11 +153,7 @@ def average_over_plausible_noise(fitted: Fitted, basis: Floats) -> Floats:
 
 def likely_noises(fitted: Fitted) -> Noise:
     """Return the likeliest noise for each set of disturbances (none, one kind, both kinds), stacked in one `Noise`."""
-    problem = fitted.problem
-    noises, _ = zip(
-        *noise_by_disturbances(fitted.rows, problem.floors, problem.leg_length_m, fitted.noise), strict=True
-    )
-    return Noise(*map(np.array, zip(*noises, strict=True)))
+    return Noise(*map(np.array, zip(*fitted.noises, strict=True)))
 
 
 def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:
@@ -167,7 +165,8 @@ def average_covariance(fitted: Fitted, noises: Noise, basis: Floats) -> Floats:
     drawn = evaluate(fitted.rows, noises)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
     moved = (drawn.move - fitted.evaluation.move)[:, :count] @ basis.T
-    # The estimate itself depends on the standard deviations, so its variance counts, too (law of total variance).
+    # The estimate itself depends on the standard deviations, so add the variance of the estimates (law of total
+    # variance).
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))
@@ -183,7 +182,7 @@ def plausible_noise_range(evaluate_at: Callable[[Floats], Evaluation], centre: F
     above = likelihoods[1 : 1 + centre.size]
     below = likelihoods[1 + centre.size :]
     curvatures = (2.0 * likelihoods[0] - above - below) / NOISE_LOG_STEP**2
-    # three standard deviations of a normal distribution with this curvature
+    # Three standard deviations of a normal distribution with this curvature.
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
     return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
 
@@ -220,7 +219,7 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
 
 
 def describe_combination(parts: list[tuple[str, float]]) -> str:
-    """Describe which parameters change together, and by which fraction of its scale each of them changes."""
+    """Describe which parameters change together, and each change as a fraction of the scale of its parameter."""
     if len(parts) == 1:
         return parts[0][0]
     up = [f"{key} ({share:.2g})" for key, share in parts if share > 0.0]
@@ -235,7 +234,9 @@ def describe_reason(value: float, largest: float) -> str:
 
 
 def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
-    """Return the fraction of information along `basis` (directions, parameters) that is lost without each quantity."""
+    """Return for each quantity the fraction of information along `basis` (directions, parameters) that is lost without
+    it.
+    """
     count = basis.shape[1]
     quantities = fitted.forecast.quantities
     if not len(basis):

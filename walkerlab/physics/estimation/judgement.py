@@ -1,4 +1,4 @@
-"""Judgement of whether a fitted model explains a measured walk, and the largest multiplier of a walk from its steps
+"""Judge whether a fitted model explains a measured walk. Also measure the largest multiplier of a walk from its steps
 alone, corrected for noise.
 """
 
@@ -20,21 +20,21 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-# Smaller residuals, as a fraction of a quantity's size, are no outliers. That of a missed heel strike is far larger.
+# Residuals below this fraction of a quantity's size are no outliers. A missed heel strike leaves a far larger one.
 SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
-NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference that suggests a key of leg 2
+NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference for which the answer suggests to fit a key of leg 2
 PHASE_BINS: Final = 20
-# fraction of the leg length. The floor of a laboratory has about 0.001.
+# fraction of the leg length; the floor of a laboratory has about 0.001
 UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
-# Largest acceptable scatter of averaged residuals, as a normal deviate. It is exceeded by 0.8 % of the walks that the
-# model explains.
+# Largest acceptable scatter of averaged residuals, as a normal deviate. Of the walks that the model explains, 0.8 %
+# exceed it.
 MAX_DEPENDENCE: Final = 2.4
 
 
 def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
-    """Return whether a model fits, and the reasons if it does not or if its errors are doubtful."""
+    """Decide whether a model fits. Also return the reasons if it does not, or if its errors are doubtful."""
     fit, reason = judge_fit(fitted)
     reasons = (reason,) if reason else (*implausible_disturbances(fitted), *dependent_residuals(fitted))
     return ("fits-but" if reasons and fit == "fits" else fit), reasons
@@ -59,8 +59,8 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
         residuals = white[index * steps : (index + 1) * steps]
         name = name_and_unit(quantity)[0]
         worst = int(np.argmax(np.abs(residuals)))
-        # The median is robust: 1.4826 times it is the standard deviation of normal residuals, however large the
-        # outliers are.
+        # The median is robust: however large the outliers are, 1.4826 times the median is the standard deviation of
+        # normal residuals.
         spread = float(np.median(np.abs(residuals))) * 1.4826 or 1.0
         large = abs(residuals[worst]) * fitted.noise.measurement[index] > SMALLEST_OUTLIER * sizes[index]
         if large and abs(residuals[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
@@ -117,7 +117,7 @@ def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
 
 
 def dependent_residuals(fitted: Fitted) -> Iterator[str]:
-    """Yield a reason to doubt the errors if averages over half steps scatter more than independent noise allows."""
+    """Yield a reason to doubt the errors if averages over half steps scatter more than independent noise explains."""
     # Angles compared at fractions of steps inherit the errors of the measured heel strikes.
     groups = fitted.forecast.half_steps
     if not groups.size:
@@ -126,7 +126,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
     squares = float((sums**2 / counts).sum())
     freedom = max(1, counts.size - fitted.u.size)
-    # As a normal deviate, so that the limit does not depend on the number of averages.
+    # Express the scatter as a normal deviate, so that the limit does not depend on the number of averages.
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "
@@ -140,7 +140,9 @@ def name_and_unit(quantity: str) -> tuple[str, str]:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Test whether odd and even steps differ. Return the normal deviate with the tail probability of Student's t."""
+    """Test whether odd and even steps differ. Return the normal deviate whose tail probability is that of
+    Student's t.
+    """
     odd = residuals[::2]
     even = residuals[1::2]
     if min(odd.size, even.size) < 2:
@@ -173,7 +175,7 @@ REPLICATES = 400
 def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     """Return the largest multiplier (...,) of the linear map that takes each step's values to the next step's.
 
-    The map is that of least squares, as in the literature, so it is biased by noise.
+    The map is fitted by least squares, as in the literature, so noise biases it.
 
     steps   (..., steps, quantities)
     stride  number of steps after which a gait repeats, each with its own mean
@@ -182,8 +184,8 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     for each in (before, after):
         for first in range(stride):
             each[..., first::stride, :] -= each[..., first::stride, :].mean(axis=-2, keepdims=True)
-    # In units of their scatter all quantities are of the same size, so the pseudo-inverse drops none of them, except
-    # constant ones, such as periods from a coarse clock.
+    # In units of their scatter, all quantities have the same size, so the pseudo-inverse drops only constant ones, such
+    # as periods from a coarse clock.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     scale[scale == 0.0] = 1.0
     before, after = before / scale, after / scale
@@ -195,8 +197,8 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
 def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | None:
     """Measure the spectral radius from periods, lengths and angles of successive steps.
 
-    The spectral radius of the fitted model is known. So the same estimate for simulated walks of this model, with the
-    fitted disturbances and noise, shows bias and standard error. Returns None for fewer than 8 steps.
+    The spectral radius of the fitted model is known. So bias and standard error of the estimate follow from simulated
+    walks of this model with the fitted disturbances and noise. Returns None for fewer than 8 steps.
 
     fitted_radius  spectral radius of the fitted walker
     """

@@ -16,18 +16,21 @@ LEG_ANGLE: Final = "angle_rad"
 
 @dataclass(frozen=True, eq=False)
 class MeasuredWalk:
-    """Quantities of consecutive steps, from heel strike to heel strike, and samples of both legs' angles if any."""
+    """Quantities of consecutive steps, from heel strike to heel strike, and samples of the angles of both legs if there
+    are any.
+    """
 
     periods_s: Floats  # (steps,)
     lengths_m: Floats | None = None  # (steps,)
-    touch_angles_rad: Floats | None = None  # (steps,) angle from the vertical of the leg that touches down
-    step: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))  # (samples,) each sample's step
-    phase: Floats = field(default_factory=lambda: np.zeros(0))  # (samples,) elapsed fraction of the step's period
-    # (samples, 2) from the vertical; the leg that swings first comes first
+    touch_angles_rad: Floats | None = None  # (steps,) angle of the leg that touches down, from the vertical
+    # (samples,) index of the step of each sample
+    step: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    phase: Floats = field(default_factory=lambda: np.zeros(0))  # (samples,) elapsed fraction of the period of the step
+    # (samples, 2) angles from the vertical, beginning with the leg that swings first
     angles_rad: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    # sum of both legs' angles from the slope's normal at heel strikes; not zero if slope or sensors are off
+    # sum of the leg angles from the slope's normal at heel strikes; not zero if slope or sensors have an error
     touch_sum_rad: float = 0.0
-    first_leg: int | None = None  # leg (1 or 2) that swings in the first step; None if unknown
+    first_leg: int | None = None  # leg (1 or 2) that swings in the first step, or None if unknown
     resolution: Mapping[str, float] = field(default_factory=dict)  # smallest decimal place of quantities, in SI units
 
     @property

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,29 +20,32 @@ from walkerlab.physics.solvers.system import Floats
 
 NOISE_FACTORS: Final = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
-"""Starts of the search: measurement noises as multiples of the current one, and disturbances as fractions. Roughness is
-a fraction of the leg length, and kicks are fractions of the rates."""
-# bounds on roughness and kicks, as these fractions
+"""Starts of the search: measurement noises as multiples of the current one, roughness as fractions of the leg length,
+and kicks as fractions of the rates.
+"""
+# bounds on roughness and kicks, as the same fractions
 DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)
-# as such a fraction; a smaller disturbance cannot be distinguished from none
+# fraction below which a disturbance cannot be distinguished from none
 NEGLIGIBLE_DISTURBANCE: Final = 1e-5
 NOISE_RATIO: Final = 1.0
-"""Prior standard deviation of the logarithm of the quantities' relative noises.
+"""Prior standard deviation of the logarithms of the relative noises of the quantities.
 
 Without this prior, the floor could explain one quantity of a short walk exactly, with a noise of zero. A single
-quantity has no ratio: there, the prior density of its noise is proportional to the noise, which keeps the estimate
-about one standard error away from zero where noise and floor cannot be separated.
+quantity has no ratio. The prior density of its noise is then proportional to the noise, which keeps the estimate about
+one standard error away from zero if noise and floor cannot be separated.
 
 Source: Chung et al., A nondegenerate penalized likelihood estimator for variance parameters in multilevel models,
 Psychometrika 78 (2013).
 """
 NOISE_SEARCH: Final = {"ftol": 1e-7, "gtol": 1e-2}
 """The search ends when the likelihood changes by less than `ftol` (relative), or when its slope is below `gtol`."""
-# number of entries in the matrices of all noise levels that are evaluated together, a limit on the memory
+# maximum number of entries in the matrices of the noise levels that are evaluated together, which limits the memory
 MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
 MIN_GAINS: Final = (1e-6, 0.5)
-"""A disturbance by heights, or one that includes kicks, must raise the log-likelihood by more than this to be kept."""
+"""A disturbance by heights, or one that includes kicks, is kept only if it raises the log-likelihood by more
+than this.
+"""
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
@@ -73,7 +77,7 @@ class Linearised:
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
-    # (values,) parts of the measured values that a robust loss leaves out of the residuals
+    # (values,) parts of the measured values that a robust loss has cut off from the residuals
     trimmed: Floats | float = 0.0
     kicks: int = 0  # number of kicks
 
@@ -83,7 +87,9 @@ class Linearised:
 
 
 class Evaluation(NamedTuple):
-    """Likelihoods and the most likely unknowns. Several sets of standard deviations add leading axes."""
+    """Likelihoods and the most likely unknowns. For several sets of standard deviations, all arrays have
+    leading axes.
+    """
 
     restricted: Any  # log-likelihood of the standard deviations with their prior, from the data alone
     likelihood: Any  # log-likelihood of the data
@@ -166,13 +172,14 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     # A reduced row stands for several values, each of which contributes the logarithm of its noise.
     log_determinant = 2.0 * (np.log(deviations) @ rows.counts + np.log(diagonal).sum(axis=-1))
     by_data = white @ white.swapaxes(-1, -2)
-    # Without priors: a prior that contradicts the data says nothing about the noise.
+    # Leave out the priors, because a prior that contradicts the data says nothing about the noise.
     _, _, squares, log_information = most_likely(by_data)
     restricted = prior_of_noise(rows, deviations)[0] - 0.5 * (log_determinant + squares + log_information)
-    information, move, squares, _ = most_likely(by_data + rows.prior)
+    whole = by_data + rows.prior
+    _, move, squares, _ = most_likely(whole)
     values = int(rows.counts.sum()) + rows.priors
     likelihood = -0.5 * (log_determinant + squares + values * math.log(2.0 * math.pi))
-    return Evaluation(restricted, likelihood, information, move, squares)
+    return Evaluation(restricted, likelihood, whole[..., 1:, 1:], move, squares)
 
 
 def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
@@ -200,9 +207,9 @@ def restricted_likelihood_and_slope(rows: Reduced, noise: Noise) -> tuple[float,
     fixed = rows.fixed * scale[:, None]
     inverse = np.linalg.inv(V)
     solved = inverse @ fixed
-    information, move, squares, log_information = most_likely(fixed.T @ solved)
+    covariance, move, squares, log_information = most_likely(fixed.T @ solved)
     left = solved @ np.append(1.0, -move)
-    P = inverse - solved[:, 1:] @ np.linalg.pinv(information, LOST_INFORMATION, hermitian=True) @ solved[:, 1:].T
+    P = inverse - solved[:, 1:] @ covariance @ solved[:, 1:].T
     unexplained = P - np.outer(left, left)
     density, slope = prior_of_noise(rows, noise.measurement)
     log_determinant = 2.0 * np.log(noise.measurement) @ rows.counts + np.linalg.slogdet(V)[1]
@@ -218,29 +225,32 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
     scale = 1.0 / np.asarray(noise.measurement)[..., rows.quantity]
     disturbed = np.einsum("...s,sij->...ij", noise.process**2, rows.covariance)
     covariance = disturbed * scale[..., None, :] * scale[..., :, None]
-    # Add rounding errors to the noise, because large disturbances would hide it in them and make the matrix singular.
+    # Add rounding errors to the noise. Otherwise large disturbances would hide the noise, and the matrix would be
+    # singular.
     rounding = ROUNDING * np.trace(covariance, axis1=-2, axis2=-1)[..., None]
     np.einsum("...ii->...i", covariance)[...] += 1.0 + rounding
     return np.asarray(covariance)
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return the information, the step to the most likely unknowns, the sum of squares there, and a log-determinant.
+    """Return the unknowns' covariance and step to their most likely values, the sum of squares there, and a
+    log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
     The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
     errors.
     """
-    information = reduced[..., 1:, 1:]
     score = reduced[..., 1:, 0]
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = np.linalg.eigh(reduced[..., 1:, 1:])
     kept = values > LOST_INFORMATION * values.max(axis=-1, initial=0.0)[..., None]
     sizes = np.where(kept, values, 1.0)
+    # The products are taken in this order, because the covariance itself may be large and known to few digits only.
     parts = np.einsum("...ij,...i->...j", vectors, score) * kept / sizes
     move = np.einsum("...ij,...j->...i", vectors, parts)
+    covariance = (vectors * (kept / sizes)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     squares = reduced[..., 0, 0] - np.einsum("...i,...i->...", score, move)
-    return information, move, squares, np.log(sizes).sum(axis=-1)
+    return covariance, move, squares, np.log(sizes).sum(axis=-1)
 
 
 def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Floats:
@@ -251,24 +261,31 @@ def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Flo
     return np.asarray(spread**2 * (rows.G.T @ (scale * np.linalg.solve(covariance_in_noise(rows, noise), left))))
 
 
-def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
+def estimate_noise(
+    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise] = ()
+) -> tuple[Noise, tuple[Noise, ...]]:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
+    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are the simpler
+    explanation, so more of them must raise the likelihood.
+
+    earlier  likeliest noises of nearly the same rows, from which the searches start if they are likelier than others
     """
     best = start
     best_likelihood = -math.inf
-    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start):
+    noises = []
+    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start, earlier):
+        noises.append(noise)
         if likelihood > best_likelihood + MIN_GAINS[bool(noise.kick)]:
             best = noise
             best_likelihood = likelihood
-    return best
+    return best, tuple(noises)
 
 
 def noise_by_disturbances(
-    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise
+    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise]
 ) -> Iterator[tuple[Noise, float]]:
-    """Yield the likeliest noise, and its likelihood, without disturbances, with each kind of them and with both kinds.
+    """Yield the likeliest noise and its likelihood without disturbances, with each kind of disturbance, and with both.
 
     Each search starts from the likeliest of several noises.
     """
@@ -278,15 +295,16 @@ def noise_by_disturbances(
     measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
     levels = np.log(DISTURBANCES)
     logs: dict[tuple[int, ...], Floats] = {}
-    for sources in rows.disturbance_sets():
+    for sources, known in zip_longest(rows.disturbance_sets(), earlier):
         starts = [np.append(row, level) for row in measured for level in levels] if sources else [np.log(middle)]
         if len(sources) == 2:
             # Start where one disturbance alone explains the walk best, and add the other one.
             starts = [np.insert(logs[(0,)], middle.size + 1, level) for level in levels]
             starts += [np.insert(logs[(1,)], middle.size, level) for level in levels]
-        before = (start.process / units)[list(sources)]
-        if sources and before.min() > NEGLIGIBLE_DISTURBANCE:
-            starts.append(np.log(np.append(middle, before)))
+        for before in filter(None, (start, known)):
+            shares = (before.process / units)[list(sources)]
+            if sources and shares.min() > NEGLIGIBLE_DISTURBANCE:
+                starts.append(np.log(np.append(np.clip(before.measurement, floors, widest), shares)))
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
         bounds = np.log([np.append(noise, [bound] * len(sources)) for noise, bound in ends]).T
         logs[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
@@ -330,8 +348,8 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
     """Return a function that whitens values (values,) of a walk with this noise, or columns (values, n) of values.
 
-    Values with the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, become independent and
-    of unit variance.
+    If values have the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, whitening makes them
+    independent with unit variance.
     """
     scale = 1.0 / noise.measurement[data.quantity]
     U, s, _ = np.linalg.svd(data.G * data.spread(noise) * scale[:, None], full_matrices=False)

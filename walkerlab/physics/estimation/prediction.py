@@ -26,22 +26,24 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     GAIN: (1.0, 0.1),
     DELAY: (0.0, 0.05),
 }
-"""Properties of clock and sensors that may be estimated: value if not estimated, and typical change."""
-# a direction of the start is dropped if a change along it has a smaller relative effect on the next step
+"""Properties of clock and sensors that can be estimated, each with the value if it is not, and a typical change."""
+# Directions of the start are dropped if changes along them have a smaller relative effect on the next step than this.
 MIN_EFFECT: Final = 1e-3
-LAST_INSTANT: Final = 1e-9  # samples in this last fraction of a walk count as after its last heel strike
+LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as later than the last heel strike.
 START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
 # Replaces EXACT_STEP for sampled angles. A larger step would shift their kinks at heel strikes across sample times.
 SAMPLED_STEP: Final = 1e-5
-# number of cached predictions; search, derivatives and checks ask for the same walks
+# number of cached predictions, since search, derivatives and checks request the same walks
 KEPT_PREDICTIONS: Final = 16
 
 
 class WalkMap(Protocol):
-    """Walks of a family of walkers from the section. Like `step_map.StepMap`, but with several parameters."""
+    """Walks of a family of walkers, which start on the section. It is like `step_map.StepMap`, but with several
+    parameters.
+    """
 
     stride: int  # number of steps after which the map repeats: 2 for legs that differ
 
@@ -74,14 +76,14 @@ class Prediction(NamedTuple):
 
     values: Floats  # (values,) predicted values
     walk: DisturbedWalk
-    times_s: Floats  # (samples,) times of angle samples from the walk's first heel strike
+    times_s: Floats  # (samples,) times of angle samples from the first heel strike of the walk
     inside: NDArray[np.bool_]  # (samples,) whether each sample is within the walk
-    angles_rad: Floats  # (samples, 2) predicted angles without the sensors' offset and gain
+    angles_rad: Floats  # (samples, 2) predicted angles, before offset and gain of the sensors
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Readings:
-    """The measured values of a walk, and how clock and sensors would show a predicted one.
+    """Measured values of a walk, and how clock and sensors would show a predicted walk.
 
     If `in_phase`, angles are compared at fractions of each step, so that fits converge from a poor first guess.
     Otherwise they are compared at their sample times, which do not depend on measured heel strikes, and periods do not
@@ -116,7 +118,9 @@ class Readings:
 
     @cached_property
     def half_steps(self) -> NDArray[np.int64]:
-        """Number (values,) of the half step and leg of each angle. Empty if steps or phases are compared."""
+        """Number (values,) of the half step and leg of each angle. It is empty if angles are not compared at sample
+        times.
+        """
         if self.in_phase or not self.measured.sampled:
             return np.zeros(0, np.int64)
         half = 2 * self.measured.step + (self.measured.phase >= 0.5)
@@ -137,7 +141,9 @@ class Readings:
         return [values[name][: self.measured.count] for name in self.channels]
 
     def sample_times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
+        """Return the sample times (samples,) from the first heel strike of the walk, and whether each is within the
+        walk.
+        """
         touches = np.append(0.0, np.cumsum(walk.durations_s))
         step = self.measured.step
         times = self.measured_times() / sensors[CLOCK]
@@ -207,7 +213,7 @@ class Forecast(Readings):
 
     @cached_property
     def _recent(self) -> Any:
-        # Arrays cannot be keys of a cache, but their bytes can.
+        # Arrays cannot be keys of a cache, so use their bytes.
         @lru_cache(KEPT_PREDICTIONS)
         def predict(u: bytes, heights_m: bytes) -> Prediction | None:
             return self._predict(np.frombuffer(u), np.frombuffer(heights_m))
@@ -233,10 +239,11 @@ class Forecast(Readings):
     ) -> tuple[Floats, Floats] | None:
         """Return derivatives with respect to unknowns (values, unknowns) and disturbances (values, heights + kicks).
 
-        exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
-        disturbed  whether to differentiate with respect to the disturbances, too
+        exact      whether differences over parameters are of fourth order; they are one-sided if a walk on one side
+        fails
+        disturbed  whether to differentiate with respect to the disturbances as well
         """
-        # Derivatives with respect to parameters are difference quotients of exact walks. The others follow from tangent
+        # Derivatives with respect to parameters are difference quotients of walks. The others come from tangent
         # columns.
         prediction = self.predict(u, heights_m)
         starts = self.directions.shape[1]
@@ -259,7 +266,7 @@ class Forecast(Readings):
 
         if exact:
             return derivative(values, SAMPLED_STEP if self.measured.sampled else EXACT_STEP)
-        # During the search, differences are one-sided: they cost one walk instead of two.
+        # During the search, differences are one-sided, because these cost one walk instead of two.
         here = values(0.0)
         ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
@@ -286,14 +293,14 @@ class Forecast(Readings):
             return None
         angles = prediction.angles_rad
         count = self.measured.count
-        # A sample outside the walk is taken at the nearest end of the walk, so its time has no effect.
+        # A sample outside the walk has the angle at the nearest end of the walk, so its time has no effect.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = (
             varied.samples_rad * sensors[GAIN]
             + rates[:, None] * self.sample_time_changes(varied.durations_s)[:, :, None]
         )
         moves = np.concatenate((*self.step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))
-        # The model's time of a sample is its measured time divided by the clock's rate.
+        # The time of a sample in the model is its measured time divided by the rate of the clock.
         clock = 0.0 if self.in_phase else -self.measured_times()[:, None] / sensors[CLOCK] ** 2
         by_name = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))
@@ -306,7 +313,9 @@ class Forecast(Readings):
 
 
 def differentiate_settling(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
-    """Return the change of the settled start per change of z (d,) along each column of `directions` (d, starts)."""
+    """Return the change of the start at rest on the ground per change of z (d,) along each column of `directions` (d,
+    starts).
+    """
     h = SETTLING_STEP
     ends = [
         walks.rest_on_ground(z + h * column, p) - walks.rest_on_ground(z - h * column, p) for column in directions.T

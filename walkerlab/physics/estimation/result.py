@@ -10,7 +10,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Fit = Literal["fits", "fits-but", "misfit", "not-converged"]
 USABLE: Final = ("fits", "fits-but")
-"""Verdicts that mean that a model explains the walk, the best first."""
+"""Verdicts by which a model explains the walk, in order from the best."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class LegDifference:
-    """Leg 2's value of an estimated key minus leg 1's, in the unit of the key."""
+    """Difference of an estimated key between the legs: value of leg 2 minus that of leg 1, in the unit of the key."""
 
     key: str
     value: float
@@ -48,8 +48,9 @@ class FirstLeg:
     """Leg that swings in the first step, and how certain that is."""
 
     leg: int
-    by: Literal["statement", "likelihood", "guess"]  # stated by file or config, decided by the data, or undecided
-    likelihood_gain: float | None  # log-likelihood minus that with the other leg first; None unless both were fitted
+    # how the leg is known: stated by file or config, decided by the data, or only guessed
+    by: Literal["statement", "likelihood", "guess"]
+    likelihood_gain: float | None  # log-likelihood minus that with the other leg first, or None unless both were fitted
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Pull:
 
     key: str
     against: Literal["bound", "prior"]
-    value: float  # bound or prior value, in the key's unit
+    value: float  # bound or prior value, in the unit of the key
     standard_deviations: float
 
 
@@ -81,8 +82,8 @@ class Information:
     directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
     covariance: Floats  # (parameters, parameters) along determined directions, in the units of the parameters
     correlations: Floats  # (parameters, parameters) correlations of the estimates
-    scales: Floats  # (parameters,) typical changes, in the parameters' units
-    freedom: float  # degrees of freedom of Student's t for the errors
+    scales: Floats  # (parameters,) typical changes, in the units of the parameters
+    freedom: float  # degrees of freedom of the Student's t distribution of the errors
     # fraction of the information due to each measured quantity, averaged over determined directions
     contributions: dict[str, float] = field(default_factory=dict)
 
@@ -95,7 +96,8 @@ class EstimateSensitivity:
     to: str  # key of the fixed parameter
     per_percent: float  # change of the estimate, in its unit
     unit: str
-    change: float  # change of the fixed parameter, in its unit: 1 % of it, or of the leg if it is zero
+    # change of the fixed parameter, in its unit: 1 % of it, or of the leg's length or inertia if it is zero
+    change: float
 
 
 @dataclass(frozen=True)
@@ -147,10 +149,10 @@ class Identification:
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
     sensitivities: tuple[EstimateSensitivity, ...]  # sensitivities to parameters that are not estimated
-    measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
+    measured_radius: MeasuredRadius | None  # None if there are few steps or no gait
     leg_differences: tuple[LegDifference, ...] = ()  # one for each estimated key of leg 2
     first_leg: FirstLeg | None = None  # None for equal legs
-    # differences if the other leg swings first. Empty if the data decide which leg does
+    # the same differences if the other leg swings first; empty if the data decide which leg does
     other_differences: tuple[LegDifference, ...] = ()
 
     @property

@@ -26,7 +26,7 @@ class KneeRules:
 
     stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
     release_at_touch: bool = (
-        False  # whether to release the trailing knee at the touch or when the other foot has sunk in
+        False  # whether to release the trailing knee at the touch, before the other foot has sunk in
     )
 
 
@@ -114,11 +114,11 @@ def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
 
 
 def fill(form: Any, assembly: parts.Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Fill a form with constants about a root. If `merges`, each knee in `locked` makes thigh and shank one body."""
+    """Fill a form with the constants for a root. If `merges`, thigh and shank of each knee in `locked` are one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
-    # A compliant stop latches at a small angle. Its thigh and shank keep that angle, so they cannot be one body: a row
-    # of E makes the shank turn with its thigh.
+    # A compliant stop latches at a small angle. Its thigh and shank keep that angle, so they cannot be one body.
+    # Instead, a row of E makes the shank turn with its thigh.
     one_with = straight if merges else {}
     separate = [body for body in range(len(assembly.bodies)) if body not in one_with]
     onto = [separate.index(one_with.get(body, body)) for body in range(len(assembly.bodies))]
@@ -138,7 +138,7 @@ def fill(form: Any, assembly: parts.Assembly, root: Root, locked: list[int], mer
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
-        # A leg without a knee names its body twice, so its extension is always zero.
+        # For a leg without a knee, thigh and shank are the same body, so its extension is always zero.
         rigid = [onto[body] for body in parts.leg_bodies(assembly)[len(knees) :, 0]]
         form["hinges"][FIRST_KNEE:] = [
             *((onto[shank], onto[thigh]) for thigh, shank in knees),

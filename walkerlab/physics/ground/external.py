@@ -14,12 +14,12 @@ from walkerlab.physics.kernels import kernel, kernel_part, vector
 
 @kernel_part
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
-    """Write the state with absolute angles into y. `chain` (n, links) maps the links' relative angles to them."""
+    """Write the state into y. `chain` (n, links) maps the relative angles of the links to the bodies' absolute ones."""
     n = chain.shape[0]
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]
     for k in range(n):
-        # The other program measures angles from the slope's normal, the state has them from the vertical.
+        # The other program measures angles from the slope's normal, but the state from the vertical.
         y[2 + k], y[4 + n + k] = -slope, 0.0
         for j in range(chain.shape[1]):
             y[2 + k] += chain[k, j] * q[2 + j]
@@ -30,7 +30,7 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
 def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet: Any, forces: Any) -> None:
     """Write the motion of both feet into `feet`, and the forces of ground, hinges and push-off into `forces`.
 
-    system  walker in the form with all bodies, with levers that run from the point of the base to feet and hip
+    system  walker in the form with all bodies; the base's point is the root from which levers run to feet and hip
     chain   (n, links) map from relative to absolute angles; bodies that move as one have equal rows
     q, v    (2 + links) coordinates and velocities of the other program
     feet    (2, 4) along (m), height (m), slip (m/s), rate of the height (m/s)

@@ -2,8 +2,8 @@
 
 A law is a class that holds the law's parameters and has the members of `FrictionLaw`. It needs a case of
 `friction_coefficient` and, if its coefficient has several formulas, cases of `switching_count` and `sample_switching`.
-Built-in laws have a name in `FRICTION_LAWS`, and those of a package one in its `Extension`. No other file depends on
-the choice of law.
+`FRICTION_LAWS` lists the built-in laws by name, and the `Extension` of a package lists its laws. No other file depends
+on the choice of law.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
         return mu, slope
     mu, slope = smooth_step(v, v_s, law.static, law.friction_velocity, law.dynamic)
-    # The sign of the force and the derivative of |slip| are opposite on both sides, so the derivative is always -slope.
+    # In both directions the force and the derivative of |slip| have opposite signs, so the derivative is always -slope.
     return (-mu if slip > 0.0 else mu), -slope
 
 

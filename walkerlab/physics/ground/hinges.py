@@ -74,7 +74,7 @@ def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None
 
 @kernel_part
 def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
-    """Compute the elastic energy (J) of the springs at all hinges, and that in the knees' stops."""
+    """Compute the elastic energy (J) of the springs at all hinges, and the elastic energy (J) of the knees' stops."""
     springs = 0.0
     stops = 0.0
     for row in range(len(system.form.hinges)):

@@ -11,8 +11,8 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-# rad, flexion that a released knee must exceed before it can lock again. At its release a knee is straight to rounding,
-# and would lock again at once.
+# rad, flexion that a released knee must exceed before it can lock again. Without it, the knee would lock at once,
+# because it is straight up to rounding when it is released.
 MIN_FLEXION = 0.01
 
 
@@ -22,7 +22,10 @@ class IdealLock(NamedTuple):
 
 @kernel_part
 def angle_between(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """Return the angle (rad) from a hinge's second body to its first, or its rate if y[first] is the first rate."""
+    """Return the angle (rad) of a hinge's first body relative to its second, or its rate (rad/s).
+
+    first  index in y of the first angle, or of the first rate
+    """
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 
@@ -72,7 +75,7 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     rates = x.size - int(whole.bodies)
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)
-    # A merged body shares the row of its group, whose column is that of the group's first body.
+    # Bodies of a group have the same row, and the column of a group is that of its first body.
     E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
     pairs = (whole.A[:n, :n], whole.B[:n, :n])
     arms = (whole.arm_x[:n], whole.arm_y[:n])

@@ -50,7 +50,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
     Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
     """
-    # At first r is the sum of torques: of feet, hinges, stops, centrifugal forces and, in a pinned form, gravity.
+    # First, r collects the torques of feet, hinges, stops, centrifugal forces and, in a pinned form, gravity.
     form = system.form
     forms.sines_cosines(form, y, s, c)
     n = form.bodies
@@ -96,7 +96,7 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate and the slip with respect to y[j].
+    """Return the derivatives of a foot's penetration, penetration rate and slip with respect to y[j].
 
     F, U  (n,) levers from the root to the foot, projected on the slope and on its normal
     """
@@ -111,14 +111,14 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
         return 0.0, 0.0, 1.0 if moves else 0.0
     if moves:
         return 0.0, -F[k], form.rolling[foot, k] - U[k]
-    # From here on: dF/dtheta = -U and dU/dtheta = F.
+    # The derivatives below follow from dF/dtheta = -U and dU/dtheta = F.
     omega = y[half + p + k]
     return -F[k], omega * U[k], -omega * F[k]
 
 
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to J. Its rows are divided by mass and inertia later."""
+    """Add the derivatives of a foot's force and torques to J, whose rows the caller divides by mass and inertia."""
     form = system.form
     push = push_on(system, t, foot, s, c)
     motion = forms.relative_to_ground(system, foot, forms.foot_motion(form, foot, s, c, y))

@@ -1,7 +1,8 @@
 """Walker on pads as an ordinary differential equation: the ground carries a foot wherever it is over a pad.
 
-This is the contact model as one would write it for a general solver, with one right-hand side and without events. So a
-foot need not come from above, and a walk never ends. Only the comparison with general solvers uses this system.
+This is the contact model as one would write it for a general solver, with one right-hand side and without events. A
+pad then also carries a foot that comes from its side, and a walk never ends. Only the comparison with general solvers
+uses this system.
 """
 
 from typing import Any, NamedTuple

@@ -13,8 +13,8 @@ from walkerlab.physics.kernels import kernel_part
 
 @kernel_part
 def pulse_force(system: OnGround, t: float, foot: int) -> float:
-    # A walk starts in the state after a strike, which contains that strike's push-off: the first pulse comes with the
-    # first touch.
+    # A walk starts in the state after a strike, in which the push-off of that strike is over, so the first pulse begins
+    # at the first touch.
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     u = (t - system.progress.last_touch) / system.form.push_off_duration

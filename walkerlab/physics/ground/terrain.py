@@ -1,8 +1,8 @@
 """Ground under each foot: lanes of pads, a plane that scuffing feet pass through, or an ordinary plane.
 
-Straight legs scuff, so the paper's walker needs a checkerboard, in a planar model a lane of raised pads for each leg.
-A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell, and suffices for feet
-that clear the ground.
+Straight legs scuff, so the paper's walker needs a checkerboard, which in a planar model is a lane of raised pads for
+each leg. A lane is divided into cells: pads (even numbers) and gaps (odd). A plane is one endless cell, and suffices
+for feet that clear the ground.
 """
 
 import math
@@ -23,9 +23,9 @@ class Terrain(NamedTuple):
 
     pitch: float  # [S] m, length of a pad, and scale of the criteria for steps and slides
     lanes: tuple[float, float]  # m, position along the slope of the centre of pad 0 in each foot's lane
-    has_pads: bool  # whether there are pads, over whose edges a foot can trip, or a plane
+    has_pads: bool  # whether the ground consists of pads, over whose edges a foot can trip; if not, it is a plane
     order_matters: bool  # whether a foot can touch only after it was ahead of the other foot while above the ground
-    heights: Any  # (footholds,) m above the slope, the start's foothold first; later footholds have the last height
+    heights: Any  # (footholds,) m above the slope, from the start on; all further footholds have the last height
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
@@ -50,7 +50,7 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope. Foothold 0 is the start's, earlier ones have its height."""
+    """Return the height (m) of a foothold above the slope. Those before foothold 0, the start's, have its height."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
@@ -63,7 +63,7 @@ def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
 
 @kernel_part
 def cell_at(terrain: Terrain, foot: int, along: float) -> int:
-    """Return the number of the cell at `along` (m) in a foot's lane. Cell j is centred j S from the lane's pad 0."""
+    """Return the number of the cell at `along` (m) in a foot's lane. The centre of cell j is j S from that of pad 0."""
     if not terrain.has_pads:
         return 0
     return math.floor((along - terrain.lanes[foot]) / terrain.pitch + 0.5)
@@ -91,7 +91,7 @@ def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether a foot in the air has ground below it: unchanged on pads, according to `order_matters` on a plane."""
+    """Whether a foot in the air has ground below it. That may change on a plane where the order of the feet matters."""
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

@@ -34,7 +34,7 @@ RELEASED, BENT, STOPPING, LOCKED = range(4)
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked: a structured scalar."""
+    """Structured scalar with the constants (SI) of the walker in one form: free or pinned, some knees locked."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers. Only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
@@ -46,7 +46,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     pinned: int  # index of the pinned foot; NO_FOOT in a free form
     kneed: bool
     has_knee: Integers  # (2,) whether each leg has a knee
-    release_at_touch: bool  # whether the trailing knee is released at the touch or when the leading foot stops sinking
+    release_at_touch: bool  # whether the trailing knee is released at the touch, before the leading foot has sunk in
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
     rolling: Floats  # (2, n) m, radius of each ball in the column of its body, zero in all others
@@ -55,7 +55,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     hip_y: Floats
     push_offs: Floats  # (2,) N s, impulse of each foot's pulse; `push_off` is the larger one
     push_off_duration: float  # s
-    onto: Integers  # (bodies of the walker,) index of each of them in this form
+    onto: Integers  # (bodies of the walker,) index in this form of each of the walker's bodies
     first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
     root_along: float  # m, position of the hinge along the slope
     root_height: float  # m, height of the hinge above the slope
@@ -144,7 +144,7 @@ PROGRESS = tree.record_type(WalkProgress, {})
 
 
 def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> WalkProgress:
-    """Create the progress record of a walk that stands on foot `stance` after `steps` steps.
+    """Create the progress record of a walk after `steps` steps, with the walker on foot `stance`.
 
     last_touch  s, time at which the last step ended
     """
@@ -187,7 +187,7 @@ def place_on_ground(
 
 @kernel_part
 def locked_knees(knee: Any) -> int:
-    """Return the index of a form by its locked knees: 0 for none, 1 for the first, 2 for the second, 3 for both."""
+    """Return the index of the form in which these knees are locked: 0 for none, 1 or 2 for one, 3 for both."""
     return (1 if knee[0] == LOCKED else 0) + (2 if knee[1] == LOCKED else 0)
 
 
@@ -300,7 +300,7 @@ def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
-    # The arms are first moments, so they lead from the hinge to the centre of mass once divided by the mass.
+    # The arms are first moments. Divided by the mass, they are the vector from the hinge to the centre of mass.
     whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass
     whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
 

@@ -5,7 +5,7 @@ Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
     KNEE          the bent knee straightens: plastic strike, the knee locks; BENT -> STRAIGHT
     HEEL_STRIKE   the swing foot comes down with AHEAD positive: push-off if there is one, plastic strike, the legs
                   change roles, the step ends; STRAIGHT -> BENT, or STRAIGHT without knees
-    HIP_FALL      the hip is too low: fell
+    HIP_FALL      the hip is too low, and the walk ends as a fall
     other ends    a heel strike with a bent knee, or no heel strike in time
 
 Contact model (`contact_loop`)
@@ -15,8 +15,8 @@ Contact model (`contact_loop`)
                   foot crosses an edge of a pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the
                   force law, at which solver steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
                   stops sinking in, and the trailing knee is released
-    walker        PASSING: the feet pass each other, and each may gain or lose its ground; FALL: the hip is too low:
-                  fell; SLIDE: the stance foot slid too far: slid
+    walker        PASSING: the feet pass each other, and each may gain or lose its ground; FALL: the hip is too low;
+                  SLIDE: the stance foot has slid too far (both end the walk)
     each knee     EXTENSION: a bent knee becomes straight, and locks or meets its stop; EXTENSION_RATE: a knee turns
                   back in its stop, and latches
     timed         PULSE_END: the push-off ends, and a trailing knee that waited for its end is released
@@ -25,7 +25,7 @@ Contact model (`contact_loop`)
 | file | content |
 |---|---|
 | `endings` | codes by which kernels of both models report the end of a walk |
-| `contact_state` | the events; the state besides coordinates: stance, contacts, signs of the event functions |
+| `contact_state` | the events; the state apart from coordinates: stance, contacts, signs of the event functions |
 | `contact_crossings` | event functions along a step, and their first zero |
 | `contact_loop` | solver steps, and the search for the time of an event |
 | `contact_transitions`, `contact_jumps` | effects of events on the walk state, and on velocities, energy and tangent |

@@ -27,7 +27,7 @@ BLOCK_POINTS = 256  # points per block, which limits the memory
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion of the legs in time, SI units."""
+    """Motion of the legs over time, in SI units."""
 
     time: Array  # (samples,) strictly rising
     angle: Array  # (samples, leg)
@@ -62,7 +62,7 @@ class Motion:
         return pieces
 
     def values_at(self, times: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (times, leg) at times (s). At a heel strike, the values just after it."""
+        """Compute angles and velocities (times, leg) at times (s). At a heel strike they are those just after it."""
         angle = np.empty((times.size, LEG_COUNT))
         velocity = np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
@@ -163,7 +163,7 @@ class WalkDifference:
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """Return the sample times (s) of both walks where the two overlap, and `walk` minus `reference` at these times."""
+    """Return all sample times (s) at which both walks are under way, and `walk` minus `reference` at these times."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.values_at(time)
@@ -172,7 +172,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both.
+    """Compute `walk` minus `reference` (step, phase, leg) in the steps that both completed.
 
     Raises ValueError if either took no step.
     """

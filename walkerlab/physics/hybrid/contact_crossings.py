@@ -52,7 +52,7 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
         hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
     )
     away = values[stance * events.PER_FOOT + events.MATERIAL, node] - walk_state.touched[stance]
-    # Squared, so that one smooth function covers slides in both directions.
+    # The slide is squared, so that one smooth function covers both directions.
     values[events.SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
     for knee in range(2):
         values[events.EXTENSION + knee, node] = extension(form, knee, y)
@@ -78,7 +78,7 @@ def sample_foot(
 def earliest_crossing(
     system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and its number."""
+    """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and the event."""
     ground = walk_state.ground
     progress = walk_state.progress
     first = NO_CROSSING, events.NO_EVENT
@@ -86,7 +86,7 @@ def earliest_crossing(
         if foot == system.form.pinned:
             continue
         row = foot * events.PER_FOOT
-        # A foot in the air has no force that switches, and switching after a touch belongs to the next solver step.
+        # Only a foot on the ground has a force that can switch. After a touch, the next solver step takes care of that.
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + events.HEIGHT] < 0
         # The rows of a foot begin with its height and edges. The switching points follow.
         end = row + events.RELEASE
@@ -114,7 +114,7 @@ def earliest_crossing(
 def earlier_event(
     first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int
 ) -> tuple[float, int]:
-    """Return the earlier one of `first` and `event`, as a fraction of the solver step and the number of the event."""
+    """Return the earlier of `first` and `event`, as a fraction of the solver step and the number of the event."""
     fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
     return (fraction, event) if fraction < first[0] else first
 

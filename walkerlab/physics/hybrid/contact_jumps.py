@@ -44,15 +44,15 @@ def change_form(
     if ends_step:
         before = before._replace(progress=forms.new_progress(stance=1 - after.progress.stance))
     if events.EXTENSION_RATE <= event < events.PULSE_END:
-        # The event has already latched this knee in the walk state, whose memory `before.knee` is. Before it, the stop
-        # acted.
+        # `before.knee` shares its memory with the walk state, in which the event has already latched this knee. Before
+        # the event, the stop acted.
         stopping = before.knee.copy()
         stopping[(event - events.EXTENSION) % 2] = STOPPING
         before = before._replace(knee=stopping)
         observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
     if waits.size > 0:
         rate = state_rate(before, y, size, t)
-        # A pulse ends a fixed time after the touch, so no column has to wait for its end.
+        # Changed states reach the event at other times, except that a pulse ends at a fixed time after the touch.
         if event != events.PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)

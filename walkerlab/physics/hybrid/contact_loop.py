@@ -57,9 +57,9 @@ class EventSearch(NamedTuple):
 def walk_in_form(
     system: OnGround, method: Any, finder: CrossingFinder, observer: ContactObserver, walk_state: WalkState, until: int
 ) -> tuple[int, int]:
-    """Walk until the steps fill `walk_state`, the walker changes its form, a pinned step is complete, or the walk ends.
+    """Walk until `walk_state` is full, the walker changes its form, a pinned step is complete, or the walk ends.
 
-    method  the start state on entry, the end state on return
+    method  solver, with the start state on entry and the end state on return
     until   NO_LIMIT, a number of steps, or AT_LIFT. After a number of steps, the walk also ends when the feet pass each
             other. With AT_LIFT, it continues until the foot that carried the last step has lifted
 
@@ -145,7 +145,7 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
+    """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already ends there."""
     latest = search.latest if search.refinements > 0 else end
     # If another event comes first now, its refinements count from zero.
     refinements = search.refinements if event == search.event else 0

@@ -47,7 +47,7 @@ RADAU_WEIGHTS = np.array(
 
 @pass_by_reference
 class Tangent(NamedTuple):
-    """Derivative Phi of the state, and workspace. `n` is the size of the free walker's state with all bodies."""
+    """Derivative Phi of the state with respect to the start, and workspace. The free walker's state has n values."""
 
     # If locked knees or a pinned foot reduce the state, only the first rows are used.
 
@@ -99,7 +99,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
     """Compute the Jacobian at the solver step's end, extrapolated from two states shortly before the end."""
-    # A solver step up to a switching point of the force law may end on either side of it, where the Jacobian jumps.
+    # The Jacobian jumps at a switching point of the force law, and a solver step to that point may end on either side.
     near = min(0.25, SIDE_OFFSET / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
         jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])
@@ -171,6 +171,7 @@ class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one o
     start_energy: float  # J, initial energy, with potential energy measured from a fixed origin
     energy_below: float  # J, initial energy, with potential energy measured from the slope below the walker
     start_spring: float  # J, initial elastic energy of the springs at the hinges
+    spring_work: float  # J, work of these springs up to the last touch that ended a step
 
 
 CONTACT_TALLY = record_type(ContactTally, {})
@@ -178,7 +179,7 @@ CONTACT_TALLY = record_type(ContactTally, {})
 
 @pass_by_reference
 class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk. Each is skipped if not requested."""
+    """Samples, energy balance and tangent of a walk. Those that are not requested are skipped."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples
@@ -250,10 +251,10 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Copy the account at a step's end, for the work in completed steps. The copied hip work includes the springs."""
+    """Record account and work of the springs at a step's end, for the work in completed steps."""
     for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[channels.HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
+    observer.tally.spring_work = observer.tally.start_spring - hinge_energies(system, y)[0]
 
 
 @kernel_part

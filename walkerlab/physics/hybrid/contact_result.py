@@ -315,14 +315,17 @@ def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
-def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
-    """Combine gravity's work for a displacement `along` the slope and `up` (m) with the drives' work in the account."""
+def driven_work(walker: ContactWalker, along: float, up: float, account: Floats, springs: float = 0.0) -> DrivenWork:
+    """Combine gravity's work for a displacement `along` the slope and `up` (m) with the drives' work in the account.
+
+    springs  work of the springs (J), which the account does not contain
+    """
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
     if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
-        return work
-    # If the knees have dampers, the hip has none, so all work that is not done by the torque is theirs.
-    return work._replace(hip=work.hip_torque, knees=work.hip - work.hip_torque)
+        return work._replace(hip=work.hip + springs)
+    # If the knees have dampers, the hip has none, so all work in the account that the torque does not do is theirs.
+    return work._replace(hip=work.hip_torque + springs, knees=work.hip - work.hip_torque)
 
 
 def gather(
@@ -353,7 +356,7 @@ def gather(
         energy_balance_residual_J=float(observer.tally.residual),
         explained_residual_J=explained_residual(observer, tolerances),
         dissipated_J=observer.account[LOSS_ENTRIES].copy(),
-        driven=driven_work(walker, along, up, observer.account_at_touch),
+        driven=driven_work(walker, along, up, observer.account_at_touch, float(observer.tally.spring_work)),
         samples=samples,
         method=tolerances.method,
     )

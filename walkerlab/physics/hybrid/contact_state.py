@@ -1,9 +1,9 @@
 """State of a walk on compliant ground apart from its coordinates: stance, contacts, signs of the event functions.
 
-The events and the settings of their criteria stand here, too. The number of an event is the row of its event function
-in the crossing finder: PER_FOOT rows for each foot, then rows for the walker and for its knees. Event `foot * PER_FOOT
-+ HEIGHT` is a touch or a lift. The numbers are module constants because kernels treat members of an IntEnum as objects
-and compile a third longer with them.
+This module also defines the events and the settings of their criteria. The number of an event is the row of its event
+function in the crossing finder: PER_FOOT rows for each foot, then rows for the walker and for its knees. Event
+`foot * PER_FOOT + HEIGHT` is a touch or a lift. The numbers are module constants because kernels treat members of an
+IntEnum as objects and take a third longer to compile with them.
 """
 
 from typing import Any, NamedTuple
@@ -189,9 +189,9 @@ def initial_sides(
 
 
 def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """Return the sign of a value, and whether the value is zero.
+    """Return the side of zero on which a value lies, 1 or -1, and whether the value is zero.
 
-    If it is, the sign is that of its rate, and if that is zero as well, `otherwise`.
+    If it is zero, its rate decides. If the rate is zero, too, the side is `otherwise`.
     """
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
@@ -228,5 +228,5 @@ def has_not_lifted(walk_state: WalkState) -> bool:
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
-    """Count the steps with complete slip and rolling: all, or all but the last if its stance foot has not lifted."""
+    """Count the steps whose slip and rolling are final: all, or all but the last if its stance foot has not lifted."""
     return int(walk_state.progress.steps) - int(has_not_lifted(walk_state))

@@ -22,7 +22,7 @@ from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 STEP_AHEAD = 0.25  # a touch that is less than this fraction of the pitch ahead of the other foot ends no step
 # m; a foot this close to the surface is on it, within the error of an event's time
 AT_SURFACE = 1e-11
-TRIP = 0.25  # a foot that touches its old pad this fraction of the pitch from where it stood has tripped
+TRIP = 0.25  # a foot that touches its old pad more than this fraction of the pitch from where it stood has tripped
 
 
 @kernel_part
@@ -62,7 +62,7 @@ def apply_event(
         else:
             return touch(system.form, walk_state, feet, foot, t, y)
     elif kind == events.LEFT_EDGE or kind == events.RIGHT_EDGE:
-        # From here on the row belongs to the same edge of the new cell, one pitch away.
+        # From now on the row stands for the same edge of the new cell, one pitch away.
         walk_state.at_zero[event] = 0
         # One edge of the old cell is the opposite edge of the new one, so that event function is now zero.
         walk_state.at_zero[
@@ -124,12 +124,12 @@ def set_foothold(
 ) -> int:
     """Set the ground under a swing foot to its next foothold's height.
 
-    On an ordinary plane, a foot that is below that height stubs.
+    On an ordinary plane, a foot that is below that height is stubbed, which ends the walk.
     """
     terrain = walk_state.ground.terrain
     set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
-    # Below its next foothold a foot finds no ground: it passes through a plane where the order of the feet matters, and
-    # stubs on any other.
+    # A foot below its next foothold passes through a plane on which the order of the feet matters. On any other ground
+    # it is stubbed.
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
 

@@ -1,4 +1,4 @@
-"""Codes of how a walk ended or, if negative, how it continues, and limits of a pose, for kernels of both models."""
+"""Codes for how a walk ended or, if negative, continues, and limits for poses. Kernels of both models use them."""
 
 from walkerlab.outcome import Outcome
 

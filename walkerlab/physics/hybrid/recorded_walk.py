@@ -77,7 +77,7 @@ class RigidWalkResult(WalkRecord):
 
 
 def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
-    """Describe how the ground would have to pull, or return nothing if it never would.
+    """Describe how the ground would have to pull. The list is empty if it would not have to.
 
     min_force    minimum normal force (N)
     min_impulse  minimum normal impulse in a strike (N s)
@@ -121,8 +121,8 @@ def take_walk(
         judged_by = abs(rigid.swing_foot(walker, start)[1]) if step_length is None else step_length
         recorder.nearest = rigid_walk.SHORTEST_LANDING * judged_by
     height = rigid.swing_foot(walker, start)[0]
-    # The walk starts in mid-step, so the swing foot leaves no foothold. Its own height takes the place of one, because
-    # otherwise its event function would be taken for zero at the start.
+    # The walk starts in mid-step, so the swing foot leaves no foothold, and its own height takes the place of one.
+    # Otherwise its event function would be taken for zero at the start.
     if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
@@ -185,7 +185,7 @@ class Recorder:
         if self.sampled:
             # Enough samples even if every step takes the longest time that a swing may take.
             room = math.ceil(steps * rigid_walk.LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
-            # Each block of steps starts at a time of zero.
+            # Within a block of steps, time is counted from the start of the block.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
             seen.knee_time[0] = -1.0
@@ -240,7 +240,7 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def build_result(self, outcome: Outcome) -> RigidWalkResult:
-        # No swing has begun, so the start has not been observed yet.
+        # If no swing has begun, the start has not been observed yet.
         if self.tally.duration == 0.0:
             observe_start(self.seen, Mode(self.walker, rigid.BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
@@ -280,7 +280,7 @@ class Recorder:
 
 
 def mean_energy(walker: RigidModel, tally: RigidTally, start: State, strikes: Array, after: Array) -> float:
-    """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
+    """Compute the time mean of the energy (J), with heights from the contact point at the touch before each step."""
     touched = np.append(start[rigid.STANCE], after[:, rigid.STANCE])
     zeros = rigid.compute_in_turns(walker, np.arange(touched.size), rigid.energy_at_touch, touched)
     if tally.duration == 0.0:
@@ -322,7 +322,7 @@ def driven_work(
 
 
 def elastic_energies(law: SpringDamper, angles: Array) -> Array:
-    """Return the elastic energy (J) of a hinge law at each angle. Laws of extensions may not take arrays."""
+    """Return the elastic energy (J) of a hinge law at each angle, one by one, because not all laws take arrays."""
     return np.fromiter((hinge_energy(law, angle) for angle in angles), float, len(angles))
 
 

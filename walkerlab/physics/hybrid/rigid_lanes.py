@@ -24,7 +24,7 @@ from walkerlab.physics.solvers.lanes import Lanes
 from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
-START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the last attempt
+START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at both ends of the last attempt
 # s: next solver step, last attempted solver step, time, time left for a heel strike
 NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = range(16, 20)
 ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = range(20, 25)
@@ -64,7 +64,7 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Convert a model of two equal straight legs with a linear hip for lanes, or return None for any other model."""
+    """Convert a model of two equal straight legs with a linear hip for use in lanes. Any other model gives None."""
     hip = hinge_law(model, HIP_ROW)
     # Laws of extensions are written for floats and may not work for lanes.
     if len(model.arm_x) != 2 or model.kneed or model.legs_differ or type(hip) is not SpringDamper:
@@ -311,7 +311,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Apply the heel strike if the solver step has reached it, otherwise set the next one to the remaining time."""
+    """Apply the heel strike if the solver step has reached it, otherwise make the next one last until the strike."""
     rows = memory.rows
     slots = memory.slots
     move_on(memory, lane)

@@ -75,7 +75,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute positions of the walker's points for each sample from angles (samples, n) in rad and steps (samples,).
+    """Compute the positions of the walker's points, from angles (samples, n) in rad and step numbers (samples,).
 
     knees_m  position of each leg's knee in its thigh's frame; empty for legs without knees
     """

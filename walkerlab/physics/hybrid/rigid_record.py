@@ -165,7 +165,7 @@ def refine_maximum(
 ) -> None:
     """Refine the maximum of a measure near fraction `middle` of the solver step, up to `last`, and record it.
 
-    The maximum of a parabola through three points is the middle of three points that are closer together.
+    The maximum of the parabola through three points becomes the middle of the next three, which are closer together.
     """
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
@@ -197,7 +197,7 @@ def observe(
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end = t + fraction * h
     spacing = 0.125 * fraction
-    # `tally.energy` is still that at the end of the solver step before, which is the start of this one.
+    # `tally.energy` is still the energy at the end of the previous solver step, where this one starts.
     mean_energy = SIMPSON[0] * tally.energy
     y = vector(mode.model.zero_state)
     before = middle = assumptions_at(method, mode, 0.0)

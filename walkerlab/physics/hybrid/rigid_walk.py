@@ -78,7 +78,7 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 
 @kernel_part
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and their rates.
+    """Compute the heel strike's event function, a function that is positive if the swing foot leads, and their rates.
 
     For straight legs that are alike, on even ground, both functions are linear in the angles, so scuffing near
     mid-swing is not a zero. Otherwise they are the foot's height above its next foothold and its distance ahead.
@@ -258,7 +258,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         before[i] = y[i]
     derivative(system, method.clock[stepping.T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
-    # The solver step ends at the event up to the error of its dense output, so a step of first order bridges the rest.
+    # The solver step misses the event only by the error of its dense output, so a step of first order covers the rest.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]

@@ -95,7 +95,7 @@ class WalkRecord:
 
     @property
     def ground_m(self) -> Array:
-        """Heights (steps + 1,) of the footholds above the slope, beginning with the start's."""
+        """Heights (steps + 1,) of the footholds above the slope, beginning with the foothold at the start."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 

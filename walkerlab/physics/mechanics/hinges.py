@@ -6,7 +6,7 @@ the second one forward. The law dissipates the power (resistance - elastic part)
 Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of its law, a
 SpringDamper or a law derived from it. The first row is the hip; the others are the knees that can bend: the swing knee
 in the rigid model, both knees on compliant ground, where each also has a stop. All rows have the same law. The record
-type of a model names it, as it fixes the number of bodies, so each kernel is compiled for one law.
+type of a model names this law, just as it fixes the number of bodies, so each kernel is compiled for one law.
 """
 
 from collections.abc import Callable, Iterable
@@ -63,7 +63,7 @@ class SpringDamper(NamedTuple):
 
     @classmethod
     def units(cls, energy: float, time: float) -> "SpringDamper":
-        """Return the units of the parameters, made of those of energy and time. Angles have none."""
+        """Return the units of the parameters, composed of those of energy and time. Angles have no unit."""
         return cls(energy, energy * time, energy)
 
 

@@ -80,7 +80,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         along = -R_before * y[at + n + rigid.STANCE]
         upward = 0.0
         if other_foot:
-            # The root's velocity above, differentiated with dF/dtheta = -U and dU/dtheta = F.
+            # The root's velocity above is differentiated with dF/dtheta = -U and dU/dtheta = F.
             for l in range(n):
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
                 upward += foot_F[l] * y[at + n + l] - foot_U[l] * y[at + l] * y[n + l]
@@ -136,7 +136,7 @@ def lock(
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
         project(tree, constraints, rates, along=0.0, upward=0.0, twist=0.0, turned=turned, p=changes)
-    # As p is a projection in the metric M, p^T M (omega - p) = 0, and the loss has this form.
+    # Because p is a projection in the metric M, p^T M (omega - p) = 0, which simplifies the loss to this form.
     return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 
@@ -182,7 +182,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     At push-off the walker is free of the ground, its knees locked and its torso coupled. An impulse P along e does the
     work (P^2 / 2) J M^-1 J^T, where J gives the velocity along e of the trailing contact point or, equally, of the hip.
     Eliminating the angular velocities from M leaves the apparent mass at the hip, m - C^T I^-1 C, with first moments C
-    and inertia I about the hip. Source: Kuo (2002); with massless legs the work is P^2 / (2 m).
+    and inertia I about the hip. With massless legs the work is P^2 / (2 m). Source: Kuo (2002).
     """
     n, E = len(model.arm_x), model.E[rigid.STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
@@ -245,11 +245,11 @@ def project(
 ) -> None:
     """Write the angular velocities (rad/s) after an impact, or a change of them, into p (n,).
 
-    omega, along, upward  velocities u before the impact, or their change: the bodies' (n,) in rad/s, the root's in m/s
+    omega, along, upward  velocities u before the impact, or their change, of bodies (n,) in rad/s and root in m/s
     twist                 N m s, impulse on the stance leg, or its change
     turned                (n,) change of momentum due to a change of the angles; zero for velocities
     """
-    # M is M' of rigid_model.py and includes the root's rolling velocity -R omega; `sliding` is `along` minus that.
+    # M is M' of rigid_model.py and includes the root's rolling velocity -R omega. `sliding` is `along` minus that.
     M, F, U = constraints.M, constraints.F, constraints.U
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[rigid.STANCE]

@@ -57,7 +57,7 @@ def rigid_on_level_ground(
 def build_first_leg_model(
     assembly: parts.Assembly, gravity: float, knee_locked_at_strike: bool, law: type[SpringDamper]
 ) -> RigidModel:
-    """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
+    """Build the model for steps in which the first leg swings. The arguments are those of `rigid_on_level_ground`."""
     hip = find_hip(assembly)
     groups = group_bodies(assembly)
     swing_foot, foot = assembly.feet
@@ -183,7 +183,7 @@ def have_equal_legs(assembly: parts.Assembly) -> bool:
 
 
 def are_equal(one: Floats, other: Floats) -> bool:
-    return bool(np.allclose(one, other, rtol=SYMMETRY_TOLERANCE, atol=SYMMETRY_TOLERANCE * np.abs(one).max()))
+    return bool(np.all(np.abs(one - other) <= SYMMETRY_TOLERANCE * (np.abs(one).max() + np.abs(other))))
 
 
 def leg_measures(assembly: parts.Assembly, k: int) -> tuple[Floats, ...]:

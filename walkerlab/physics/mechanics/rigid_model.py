@@ -6,7 +6,7 @@ R = 0 it is a hinge. With M, r, F and U of tree.py, Kronecker's delta d and the 
     M'_kl = M_kl + R (U_k d_ls + U_l d_ks) + m R^2 d_ks d_ls
     r'_k = r_k - d_ks R (sum over l of omega_l^2 F_l + m g_along)
 
-Body 0 is the swing leg (or its thigh), body 1 the straight stance leg; then come the swing leg's shank and the bodies
+Body 0 is the swing leg (or its thigh), body 1 the straight stance leg. Then come the swing leg's shank and the bodies
 that both legs share. Bodies that follow others are eliminated as in tree.py.
 """
 
@@ -28,16 +28,16 @@ NO_SHANK = -1
 
 @tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants of the rigid model in SI, a structured scalar whose type fixes the number n of bodies."""
+    """Structured scalar with the constants (SI) of the rigid model. Its type fixes the number n of bodies."""
 
     # E holds three reductions: BENT, STRAIGHT and AT_STRIKE. If the legs differ, `paired_with` is the model in which
-    # the other leg swings. It is no field, because kernels take both models as an array, see `models_in_turn`.
+    # the other leg swings. It is not a field, because kernels take both models as an array (see `models_in_turn`).
     paired_with = cast("RigidModel | None", None)
 
     foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
     roles: Integers  # (n,) body k after a heel strike is body roles[k] before it
-    section: Integers  # (n + 1,) state indices of the d section coordinates, from the stance leg's angle on; then zeros
+    section: Integers  # (n + 1,) state indices of the d section coordinates, the stance leg's angle first, then zeros
     coordinates: int  # [d] number of coordinates on the section
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees
@@ -102,7 +102,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
 
 def replace_fields(model: Any, fields: Any) -> RigidModel:
-    """Return a read-only copy of a model with some fields changed. The copy has no partner."""
+    """Return a read-only copy of a model with some fields changed. The copy is not paired with another model."""
     memory: Any = np.empty((), model.dtype)
     memory[()] = model
     tree.write_fields(memory, fields)
@@ -115,7 +115,7 @@ def pair(first: RigidModel, second: RigidModel) -> RigidModel:
     """Return a copy of `first`, in which leg 1 swings, paired with `second`, in which leg 2 swings."""
     model = replace_fields(first, {})
     other = replace_fields(second, {})
-    # NumPy would look for a field of this name in the record.
+    # An ordinary assignment would make NumPy look for a field of this name in the record.
     object.__setattr__(model, "paired_with", other)
     return model
 
@@ -271,7 +271,8 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
         by_rate = matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
-            # The state no longer needs alpha. Now it holds d alpha, from E^T M' E d alpha = E^T (dr' - dM' alpha).
+            # The state's alpha is no longer needed. From here on, alpha holds d alpha, the solution of
+            # E^T M' E d alpha = E^T (dr' - dM' alpha).
             for k in range(n):
                 total = 0.0
                 for l in range(n):
@@ -423,7 +424,7 @@ def hip_height(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
-    """Compute the sum (rad) of the straight legs' angles from the slope's normal, zero if both feet are on even ground.
+    """Compute the sum (rad) of the straight legs' angles from the slope's normal: 0 if both feet are on even ground.
 
     For legs that are alike, the sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays
     or lanes, measured from the vertical. (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from

@@ -194,7 +194,7 @@ def add_inertia_gradients(
             sin_d = s[l] * c[k] - c[l] * s[k]
             turning = A * sin_d - B * cos_d
             change = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
-            # All terms depend on theta_l - theta_k, so the derivative by theta_k is the opposite.
+            # All terms depend on theta_l - theta_k, so the derivative with respect to theta_k is the negative.
             diagonal -= change
             by_angle[k, l] += change
             by_rate[k, l] += 2.0 * omega[l] * turning

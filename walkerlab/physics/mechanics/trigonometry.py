@@ -17,7 +17,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     """Compute (sin x, cos x) within one unit in the last place.
 
     Up to pi/4, the range of a walking leg, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
-    Microsystems 1993), evaluated in independent pairs of terms; beyond it, the library's functions.
+    Microsystems 1993), evaluated in independent pairs of terms. Beyond it, they are the library's functions.
     """
     if abs(x) > QUARTER_PI:
         return math.sin(x), math.cos(x)

@@ -61,7 +61,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
         observer.last[walk, i] = y[i + 1]
     for k in range(observer.owner.size):
         a, b, c = y[1] - observer.points[k, 0], y[2] - observer.points[k, 1], y[3] - observer.points[k, 2]
-        # Strict, so that an attractor with a reach of zero captures nothing.
+        # The comparison is strict, so that an attractor with a reach of zero captures nothing.
         if a * a + b * b + c * c < observer.reach[k]:
             observer.attractor[walk] = observer.owner[k]
             return WALKED
@@ -71,7 +71,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
     points: Floats  # (period, 3) section points in walking order, a stride apart, starting with the smallest angle
-    reach: float  # distance from which all test walks return to it; zero if not all return from any distance tried
+    reach: float  # largest distance tried from which all test walks return to it, or zero if there is none
 
     @property
     def period(self) -> int:

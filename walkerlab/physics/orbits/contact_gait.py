@@ -22,7 +22,7 @@ from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-WARM_UP_STEPS = (4, 2, 0)  # how many steps to walk before Newton's method; tried in turn
+WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
 SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
 CONTACT_EFFORT = Effort(1e-10, max_evaluations=10, shortest=1e-3, growth=2.0, rounding=1.0)
 # factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
@@ -97,7 +97,7 @@ def section_points(
 
 
 def solve_gait_on(pads: AdaptivePads, z: Floats, steps: int, rigidity: float = 0.0) -> Cycle | str:
-    """Solve for a gait of some steps near z (d,), or return why there is none."""
+    """Solve for a gait of `steps` steps near z (d,), or return why there is none."""
     gait = gait_near(pads, z, rigidity, CONTACT_EFFORT, steps)
     if isinstance(gait, NotConverged):
         if gait.singular:
@@ -114,7 +114,7 @@ def solve_gait_on(pads: AdaptivePads, z: Floats, steps: int, rigidity: float = 0
 
 def scale_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
-    # The full-damping penetration shrinks like the static penetration, so that a resting foot has the same share of the
+    # The full-damping penetration shrinks like the static penetration, so that a foot at rest keeps its fraction of the
     # full damping.
     normal = walker.normal.stiffen(stiffness, damping, stiffness ** (-1.0 / walker.normal.exponent))
     return walker._replace(normal=normal, friction=walker.friction.scale_creep(creep))

@@ -67,7 +67,7 @@ def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
+    """Return the bodies that turn independently, the swing leg's first. The locked stance shank is not among them."""
     # If only one leg has a knee, there is one body fewer while that leg stands.
     locked = locked_shank(walker, stance)
     # `legs` repeats the last body of a leg without a knee, and `dict.fromkeys` drops the repetition.
@@ -300,7 +300,7 @@ def have_different_soles(walker: ContactWalker) -> bool:
 
 
 def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above."""
+    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) higher."""
     apart = 0.5 * np.hypot(along, up) / leg_length
     return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
@@ -371,7 +371,7 @@ def walk_state_on_section(site: WalkerOnGround, start: State, steps: int, stance
 
 
 def section_units(site: WalkerOnGround, stance: int) -> Floats:
-    """Return the units (d,) of the coordinates on the section in which foot `stance` stands."""
+    """Return the units (d,) of the section coordinates while foot `stance` is the stance foot."""
     L = site.ground.frame.leg_length
     tau = site.ground.frame.pendulum_time
     angles, rates = (len(bodies(site.walker, stance)) for bodies in (angled_bodies, turning_bodies))
@@ -390,7 +390,7 @@ class ContactMap(StepMap):
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     disturbs_after = 1
-    # It must be small compared with the penetration of stiff ground, which is below 0.01 mm.
+    # A probe must be small compared with the penetration of stiff ground, which is below 0.01 mm.
     probe = 1e-6
 
     def __init__(

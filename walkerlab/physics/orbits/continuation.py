@@ -136,7 +136,7 @@ def correct(
 @dataclass(frozen=True)
 class StepControl:
     first: float = 0.01  # arclength of the first step
-    # arclength; folds of long gaits are sharper than 1e-8
+    # arclength, so short because folds of long gaits are sharper than 1e-8
     shortest: float = 1e-9
     longest: float = 0.05  # arclength
     turn: float = 0.97  # cosine of the largest angle between the tangents of neighbouring points

@@ -48,7 +48,7 @@ Searcher = Callable[[int, Floats], DesignSearch]
 
 
 def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
-    from scipy.optimize import NonlinearConstraint, minimize  # takes a tenth of a second, only needed here
+    from scipy.optimize import NonlinearConstraint, minimize  # imported here, because it takes a tenth of a second
 
     span = problem.upper - problem.lower
     search = DesignSearch(start, None)
@@ -57,7 +57,7 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
     def point_at(u: Floats) -> Point | None:
         # SLSQP may leave the bounds by rounding.
         x = problem.lower + np.clip(u, 0.0, 1.0) * span
-        # The objective and each constraint ask for the same point in turn.
+        # Points are kept, because the objective and each constraint ask for the same one in turn.
         if x.tobytes() not in seen:
             seen[x.tobytes()] = problem.evaluate(x)
         point = seen[x.tobytes()]

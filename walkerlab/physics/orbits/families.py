@@ -203,7 +203,7 @@ class BranchTracer:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
             before = last
             last = solved
-        # Begin at an unstable gait, so that no stable stretch is split.
+        # A closed branch begins at an unstable gait, so that no stable stretch is split.
         if end.reason == CLOSED_LOOP:
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
             points = [*points[begin:-1], *points[: begin + 1]]
@@ -231,7 +231,7 @@ class BranchTracer:
         return is_acceptable
 
     def steps_to_repeat(self, gait: Cycle) -> int:
-        """Return the number of steps after which a gait repeats, a divisor of the number of steps that it has."""
+        """Return the number of steps after which a gait repeats, which divides the number of its steps."""
         stride = self.step_map.stride
         strides = enumerate(gait.steps[stride - 1 :: stride], 1)
         return next(n * stride for n, step in strides if np.abs(step.z - gait.z).max() < SAME_STATE)

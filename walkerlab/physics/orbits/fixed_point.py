@@ -28,16 +28,16 @@ from walkerlab.physics.solvers.system import Floats, State
 RANDOM_START = "random start"
 # rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
-# Relative to the angle between the legs at heel strike. Samples do not resolve smaller angles.
+# Fraction of the angle between the legs at heel strike, below which samples do not resolve angles.
 ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
 # tolerances of steps during the search. The gaits themselves are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
-# target residual, and largest residual of an acceptable gait, because rounding errors are larger on steep slopes
+# target residual, and largest residual of an acceptable gait, which allows for the rounding errors on steep slopes
 SOLVED_RESIDUAL = 1e-14
 MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
-# following a gait from a vanishing slope
+# settings for following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # strides in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
 # Relative residual. It cannot be small, because a multiplier tends to 1 as the slope vanishes.
@@ -94,7 +94,7 @@ class RigidGait:
 
     @property
     def asymmetry(self) -> dict[str, float]:
-        """Second step minus first step, in length and in period, divided by the mean of both."""
+        """Differences in length and in period between the second and the first step, relative to the mean of both."""
         (first_period, first_length), (second_period, second_length) = self.steps
         return {
             "step_length": (second_length - first_length) / self.step_length,
@@ -445,8 +445,8 @@ class Search:
         d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
-        # The first coordinate was drawn as the angle between the legs. With both feet on the slope it determines the
-        # stance leg's.
+        # The first coordinate was drawn as the angle between the legs. With both feet on the slope, this determines the
+        # angle of the stance leg.
         starts[:, 0] = 0.5 * (starts[:, 0] - rigid.feet_on_slope(self.walker, 0.0, 0.0))
         if self.walker.legs_differ:
             self.search_strides(starts)
@@ -469,7 +469,7 @@ class Search:
                 self.keep(gait.z, RANDOM_START)
 
     def stands(self, z: Floats) -> bool:
-        # With both feet on the slope, this sum with the stance leg counted twice is the angle between the legs.
+        # With the stance leg counted twice, this sum is the angle between the legs if both feet are on the slope.
         return bool(abs(rigid.feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:

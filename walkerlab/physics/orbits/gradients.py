@@ -1,8 +1,8 @@
 """Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
 
 With section coordinates z and the derivative A of the step map P, dz/dp = (I - A)^-1 dP/dp, and every quantity of the
-gait changes along (dz/dp, 1). Derivatives with respect to p are difference quotients of exact steps in this direction;
-that of a multiplier follows from the derivative of A and from the multiplier's left and right eigenvectors. Two step
+gait changes along (dz/dp, 1). Derivatives with respect to p are difference quotients of exact steps in this direction.
+The derivative of a multiplier follows from that of A and from the multiplier's left and right eigenvectors. Two step
 sizes give an error estimate, and the step is halved as long as this reduces errors that are not yet small.
 """
 
@@ -32,7 +32,7 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # number of quantities, the first ones, that follow from a single stride
+STEP_QUANTITY_COUNT = 3  # number of quantities, listed first, that follow from a single stride
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
@@ -83,9 +83,9 @@ def mean_quantities(stride: Cycle) -> tuple[float, float, float]:
 
 
 def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
-    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled, or None if unstable.
+    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled.
 
-    If the legs differ, it is the root mean square over the drops under each foot.
+    If the legs differ, it is the root mean square over the drops under each foot. Returns None for an unstable gait.
     """
     responses = [response(each, "floor-drop") for each in gait.split_by_leg()]
     norms = [float(result[0][0]) for result in responses if result is not None]
@@ -208,7 +208,10 @@ def make_gradient(value: float, error: float) -> Gradient:
 
 
 def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) -> Gradient:
-    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps."""
+    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps.
+
+    change, error  (d, d) derivative of A with respect to the parameter, and its error
+    """
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))

@@ -28,7 +28,7 @@ METHOD = "radau5"
 LIMIT_BUDGET = 50_000_000
 GAIT_TOLERANCE = 1e-10
 CHECK_TOLERANCE = 1e-11
-# tolerances of timed walks, and of walks that check their numerical error
+# tolerances of timed walks, and of the walks that show their numerical error
 WALK_TOLERANCE = 1e-8
 WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
@@ -67,14 +67,14 @@ SERIES_SETTINGS = {
 
 
 def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
-    """Return every `every`-th contact setting of a series, from the config's towards the rigid limit."""
+    """Return every n-th contact setting of a series (n is `every`), from that of the config to the most rigid one."""
     count, ratio, powers = SERIES_SETTINGS[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
 
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """Return the walker on the ground of a setting. If the series varies all parameters, shorten its push-off."""
+    """Return the walker on the ground of a setting, with a shorter push-off if the series varies all parameters."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed = scale_laws(walker, *setting[2:])
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
@@ -192,7 +192,7 @@ class Limit:
 def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
     """Return angles (rad) and angular velocities (rad/s) of the legs, (samples, 2) each.
 
-    Those of a kneed leg are those of its thigh.
+    For a kneed leg they are those of its thigh.
     """
     upper = walker.legs[:, 0]
     half = states.shape[1] // 2
@@ -227,7 +227,7 @@ def extrapolate(distances: list[Distance]) -> Extrapolation | None:
 
     Returns None if the periods do not converge.
     """
-    # From the setting on whose change of the period is below its numerical error, changes are only noise.
+    # Once the period changes by less than its numerical error, all further changes are only noise.
     periods = np.array([distance.period for distance in distances])
     errors = np.array([distance.numerical_period for distance in distances])
     unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])

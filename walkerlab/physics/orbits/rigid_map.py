@@ -216,10 +216,10 @@ class RigidStepper(local):
         start: Floats | None = None,
         observer: Observer | None = None,
     ) -> Steps:
-        """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
+        """Walk from z (d,). The derivative, a third of the work, is skipped if `derived` is false.
 
         floor  rises and nearest landing, as in `HeelStrikes`, in units of the walker. The default is even ground
-        start  (2 n,) state off the section from which to walk instead of z, without a derivative
+        start  (2 n,) state from which to walk instead of z, without a derivative. It need not lie on the section
         """
         d, size = section.basis.shape
         method, columns = (self.memory.varied, d) if derived else (self.plain, 0)
@@ -275,7 +275,7 @@ class RigidStepper(local):
         return StepTangents(before[0], rates, *(each / TANGENT_SCALE for each in by))
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
-        """Run Newton's method from starts (starts, d), overwritten with the last points tried.
+        """Run Newton's method from `starts` (starts, d), which are overwritten with the last points tried.
 
         gaits  known gaits, as section coordinates (d,) and derivative (d, d) of the step map
 
@@ -305,7 +305,7 @@ def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits,
 
 @kernel_part
 def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
-    """Run Newton's method from z (d,), overwritten with the last point tried.
+    """Run Newton's method from z (d,), which is overwritten with the last point tried.
 
     A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
     The search stops if a known gait is close and one correction with its derivative would almost reach it.
@@ -459,6 +459,15 @@ class SimilarWalker(NamedTuple):
         durations = np.diff(walk.time, prepend=0.0) * units.time
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
+
+    def ground_after_push(self, z: Floats, push_N_s: float, steps: int, swing: int) -> tuple[float, float]:
+        # Negative values mean that the ground would have to pull.
+        walker = self.leg_swing(swing).walker
+        start = state_on_section(walker, z)
+        pushed = as_state(push_at_hip(walker, start, push_N_s / self.units.impulse))
+        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
+        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
+        return impulse * self.units.impulse, walk.min_normal_force * self.units.force
 
     def differentiate_walk(
         self, stepper: RigidStepper, z: Floats, heights_m: Floats, along: Floats, times_s: Floats, kicked: bool
@@ -621,15 +630,7 @@ class RigidMap(StepMap):
         self, z: Floats, p: float, push_N_s: float, steps: int, swing: int = 0
     ) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
-        # Negative values mean that the ground would have to pull.
-        unit = valid(self._unit_at(p))
-        walker = unit.leg_swing(swing).walker
-        units = unit.units
-        start = state_on_section(walker, z)
-        pushed = as_state(push_at_hip(walker, start, push_N_s / units.impulse))
-        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
-        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
-        return impulse * units.impulse, walk.min_normal_force * units.force
+        return valid(self._unit_at(p)).ground_after_push(z, push_N_s, steps, swing)
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         unit = valid(self._unit_at(p))

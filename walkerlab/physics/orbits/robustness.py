@@ -145,7 +145,7 @@ def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
     """Return the norms and the response of the disturbed step, or None if a walk fails or the gait is unstable.
 
-    times  factor on the difference step
+    times  factor by which the difference step is multiplied
     """
     d, h = gait.z.size, times * gait.step_map.probe
 

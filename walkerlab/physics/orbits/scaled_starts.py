@@ -1,7 +1,7 @@
 """Starts with scaled velocities: how far the velocities may change, and the smallest change that leads to walking.
 
 In the paper both velocities were raised by hand until the contact model walked. In this module a start is a pair of
-factors (s_1, s_2) on the velocities of swing and stance leg, and (1, 1) is the unchanged rigid start.
+factors (s_1, s_2) applied to the velocities of swing and stance leg, and (1, 1) is the unchanged rigid start.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class ScaledStarts:
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
         """Return the number of steps after which periods and lengths match the gait.
 
-        Returns None if those of the last step do not.
+        Returns None if the last step does not match.
         """
         if self.gait is None:
             return None
@@ -99,7 +99,7 @@ def scaled_starts(
     steps: int,
     gait: tuple[tuple[float, float], ...] | None,
 ) -> ScaledStarts:
-    """Build the scaled starts of a scene. `start_of` is linear in the factors on the two angular velocities."""
+    """Build the scaled starts of a scene. `start_of` is linear in the factors for the two angular velocities."""
     still = start_of(0.0, 0.0)
     swing = start_of(1.0, 0.0)
     stance = start_of(0.0, 1.0)
@@ -132,7 +132,7 @@ def margins(
 ) -> list[Margin]:
     """Find how far the velocities of a start may be scaled, alone and together, until it no longer leads to walking.
 
-    around   factors on the velocities of swing and stance leg that lead to walking
+    around   factors for the velocities of swing and stance leg that lead to walking
     largest  largest factor tried
     """
     # Factors are `step` apart until one fails. Then the last interval is bisected.
@@ -175,7 +175,7 @@ def smallest_change(
     """Find the start nearest to (1, 1) that leads to walking, on finer and finer grids around the nearest candidate.
 
     starts      starts with the config's solver tolerances
-    quick       the same starts with the map's tolerances; the result walks with both
+    quick       the same starts with the map's tolerances; the result leads to walking with both
     candidates  (n, 2) factors of a map's cells that lead to walking
     cell        spacing of the map's cells
     """
@@ -191,7 +191,7 @@ def smallest_change(
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
             nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
-            # Evaluated one at a time, the cheap walk first: most points need no more.
+            # Points are evaluated one at a time, the cheap walk first, because most points need no more.
             both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))
@@ -203,10 +203,10 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Results of walks over factors on both velocities. Each row has one factor on the stance leg's velocity."""
+    """Results of walks over factors for both velocities. A row has a single factor for the stance leg's velocity."""
 
-    swing: Floats  # (columns,) factors on the swing leg's velocity
-    stance: Floats  # (rows,) factors on the stance leg's velocity
+    swing: Floats  # (columns,) factors for the swing leg's velocity
+    stance: Floats  # (rows,) factors for the stance leg's velocity
     outcome: Integers  # (rows, columns)
     steps: Integers  # (rows, columns)
     settled: Integers  # (rows, columns) 1 if the last step matches the gait

@@ -34,7 +34,7 @@ class Units(NamedTuple):
     def natural_unit(self, unit: str) -> float:
         """Return the walker's natural unit, in SI, for a quantity with the config's `unit`, such as 'N m'.
 
-        Raises KeyError if unknown.
+        Raises KeyError for an unknown unit.
         """
         inertia = self.mass * self.length**2
         damping = self.energy * self.time

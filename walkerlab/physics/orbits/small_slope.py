@@ -5,13 +5,13 @@ and the heel strike is a constant linear map. Two kinds of period-1 motion remai
 
 Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, so that to
 leading order the impact changes nothing. Its energy loss, M (L omega alpha)^2 / 2 at an angle alpha between the legs,
-equals the energy from a step's descent, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
+equals the energy from a step's descent, M g L alpha phi. As omega is proportional to alpha, phi = kappa alpha^3.
 
 Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
-ratio grows without bound as the feet's mass vanishes; in that limit this gait also grows as the cube root of phi.
+ratio grows without bound as the feet's mass vanishes. In that limit this gait, too, grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
-Eng. 120 (1998), section 4 and appendix; in this module the legs have mass.
+Eng. 120 (1998), section 4 and appendix. Unlike theirs, the legs in this module have mass.
 """
 
 import math

@@ -125,7 +125,7 @@ class StepMap(Stepper, Protocol):
         return z
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample the angles (times, 2) of both legs in a disturbed walk; the leg that swings first is column 0.
+        """Sample the angles (times, 2) of both legs in a disturbed walk. Column 0 is the leg that swings first.
 
         times_s  increasing times from the first heel strike on, all before the last heel strike
         """

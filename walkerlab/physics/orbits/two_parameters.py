@@ -4,8 +4,8 @@ A bifurcation is a gait at which a test function vanishes: P^n(z) = z and det(DP
 gait, with the second parameter as one more unknown. The curve is continued by arclength like a branch.
 
 Cells are computed in rows of equal second parameter, outwards from the row of the known branches. Newton's method finds
-the period-1 gait of each cell from the gaits of its neighbours. A stable gait is the attractor; otherwise a walk from a
-neighbouring cell's attractor, or from near the unstable gait, finds the attractor.
+the period-1 gait of each cell from the gaits of its neighbours. A stable gait is the attractor. Otherwise a walk from
+the attractor of a neighbouring cell, or from near the unstable gait, finds the attractor.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
 """
@@ -179,7 +179,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferably stable, or None if no branch has one."""
+    """Interpolate a period-1 gait, if possible a stable one, from the branches at each value. None means no gait."""
     gaits = list[Floats | None]([None] * len(values))
     stable = np.zeros(len(values), bool)
     for branch in branches:

@@ -239,7 +239,7 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
 
 @stepping.interpolate.case(Dop853)
 def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> None:
-    """Evaluate Hairer's contd8, with nested products expanded into one weight per row."""
+    """Evaluate the dense output (Hairer's contd8), with nested products expanded into one weight per row."""
     s, r, d = fraction, 1.0 - fraction, method.dense
     w1 = s * r
     w3 = s * r * s * r
@@ -260,7 +260,7 @@ LANE_ERROR_3 = tableau.nonzero(tableau.ERROR_3)
 @kernel_part
 def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
-    # Written out, because in compiled code tuples of different lengths are different types: no loop can extend them.
+    # The stages are written out, because compiled code has a type for each length of a tuple: no loop can extend them.
     k2 = lanes.derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, WEIGHTS[1], (k1,)))
     k3 = lanes.derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, WEIGHTS[2], (k1, k2)))
     k4 = lanes.derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, WEIGHTS[3], (k1, k3)))
@@ -281,7 +281,10 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 
 @kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Compute, for each error estimate, the sum of squares of error over tolerance. `method` holds rtol and atol."""
+    """Compute, for each error estimate, the sum of the squared ratios of error to tolerance.
+
+    method  object that has the tolerances rtol and atol
+    """
     error_5 = 0.0
     error_3 = 0.0
     for i in range(len(y)):

@@ -1,8 +1,8 @@
 """Coefficients of DOP853, the explicit Runge-Kutta pair of order 8(5,3) of Dormand and Prince.
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), sections II.5 and II.6, and
-the authors' Fortran code dop853.f. Row s of A holds the weights of the stages before stage s, counted from
-0; row 12 those of the solution of order 8. `nonzero` drops unused weights.
+the authors' Fortran code dop853.f. Row s of A, counted from 0, holds the weights of the stages before stage s. Row 12
+holds the weights of the solution of order 8. `nonzero` drops unused weights.
 """
 
 # fmt: off

@@ -1,8 +1,8 @@
 """Zero crossings of event functions within a step, including several crossings in one step.
 
 Within a step, an event function is replaced by the polynomial through its values on the dense output. In Bernstein
-form, a polynomial lies in the hull of its coefficients, so coefficients of one sign prove that there is no crossing;
-otherwise bisection isolates the crossings. A sign check at the ends of a step would miss double crossings.
+form, a polynomial lies in the hull of its coefficients, so coefficients of one sign prove that there is no crossing.
+Otherwise bisection isolates the crossings. A sign check at the ends of a step would miss double crossings.
 
 A crossing is a change of sign. An event function that touches zero and turns back does not cross. The last event leaves
 its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a
@@ -64,7 +64,7 @@ def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int =
 def sampling(degree: int) -> tuple[Any, Any]:
     """Compute the nodes (degree + 1,) and the matrix that maps values at the nodes to Bernstein coefficients."""
     size = degree + 1
-    # Chebyshev points: equidistant ones would amplify rounding errors at this degree.
+    # These are Chebyshev points, because equidistant ones would amplify rounding errors at this degree.
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
     constant = np.array([1.0])
@@ -103,8 +103,8 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
         if high <= after or signs == 0:
             top -= 1
             continue
-        # By Descartes' rule of signs, one change of sign means exactly one crossing, more changes only bound their
-        # number.
+        # By Descartes' rule of signs, one change of sign means exactly one crossing. More changes only bound the number
+        # of crossings.
         if (signs == 1 and low >= after) or high - low < MIN_PIECE:
             top -= 1
             # The removed piece stays in memory above the top of the stack.

@@ -1,10 +1,10 @@
-"""Radau IIA of order 5: implicit and L-stable, for stiff contact. Simplified Newton with an exact Jacobian.
+"""Radau IIA of order 5: implicit and L-stable, for stiff contact. Simplified Newton iterations use an exact Jacobian.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8.
 
 The linear systems, (s I - J) x = r, are reduced to half their size for equations of motion. With q' = v the
 upper half of the Jacobian is (0 I). Eliminating the positions leaves (s I - J_v - J_q / s) x_v = r_v + J_q r_q / s and
-x_q = (r_q + x_v) / s. The factors take an eighth of the work. If the velocities were eliminated instead,
+x_q = (r_q + x_v) / s. Factoring then takes an eighth of the work. If the velocities were eliminated instead,
 x_v = s x_q - r_q would lose digits by cancellation where damping is stiff. The source calls this 'special structure'.
 """
 
@@ -29,7 +29,7 @@ def unknowns(J: Any) -> int:
         return n
     for i in range(half):
         for j in range(n):
-            # Compared exactly: the Jacobian of equations of motion has these rows as literal zeros and ones.
+            # The comparison is exact, because the Jacobian of equations of motion has literal zeros and ones here.
             if J[i, j] != (1.0 if j == half + i else 0.0):
                 return n
     return half
@@ -349,7 +349,7 @@ def refresh(method: Radau5, system: Any) -> None:
 
 @kernel_part
 def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
-    """Choose the step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
+    """Choose the step after an accepted one: the smaller of the standard prediction and that of Gustafsson, (8.25)."""
     control = method.control
     if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
         predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety

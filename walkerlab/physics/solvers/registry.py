@@ -63,7 +63,7 @@ METHODS = {
 def method_named(name: str) -> Method:
     """Return a method by name.
 
-    Raises KeyError with all names for an unknown one.
+    Raises KeyError for an unknown name, with a list of all names.
     """
     if name in METHODS:
         return METHODS[name]
@@ -97,7 +97,7 @@ class Tolerances:
 
 
 def share_counts(method: Any, clock: Any, counts: Any) -> Any:
-    """Return the method with the clock and counts of another method, so that both integrate the same walk in turns."""
+    """Return the method with the clock and counts of another method, so that both integrate the same walk in turn."""
     if isinstance(method, ScipyMethod):
         method.clock = clock
         method.counts = counts

@@ -16,7 +16,7 @@ DIVERGED = 1e12  # a component of the state beyond this means that the run diver
 def semi_implicit_euler(system: Any, y: Any, rate: Any, end: float, h: float, max_steps: int) -> int:
     """Integrate y (n,) in place from time 0 to `end` (s) with steps of h (s), and return the number of steps.
 
-    The first half of y holds positions, the second half their velocities; `rate` (n,) is scratch memory. The last step
+    The first half of y holds positions, the second half their velocities. `rate` (n,) is scratch memory. The last step
     is shortened to end at `end`. The run stops early after `max_steps`, or if the state diverges or is not a number.
     """
     half = y.size // 2

@@ -1,6 +1,6 @@
 """Interface of continuous systems: functions whose bodies are chosen by the type of the system.
 
-A system is a NamedTuple that registers a body for each of these functions; integrators call nothing else. States are
+A system is a NamedTuple that registers a body for each of these functions. Integrators call nothing else. States are
 arrays (n,) in the caller's memory, which `derivative` and `jacobian` never write.
 """
 
@@ -19,7 +19,7 @@ State = tuple[float, ...]
 
 @dispatch_by_type
 def block(system: Any) -> Any:
-    """Return a value whose length, fixed at compile time, is the block size of loops over the state. It divides n."""
+    """Return a value whose length is the block size of loops over the state: fixed at compile time, a divisor of n."""
 
 
 @dispatch_by_type

@@ -22,6 +22,7 @@ from walkerlab.pipeline.plan.results import FolderResults, Step
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.run.executor import Executor
+from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.files import write_numbered
 from walkerlab.pipeline.store.runs import RunFolder, claim, refuse_another_config
 from walkerlab.scene.omissions import LeftOut
@@ -43,6 +44,7 @@ class StageReport:
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    content: Stored | None = None  # the result as stored; None if there is no result
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON object of a stage: keys common to all stages, then those of its summary."""
@@ -172,6 +174,7 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
         steps=tuple(run.done),
         no_answer=no_answer_of(run, summary.get("no_answer")),
         results={name: dict(answer.summary) for name, answer in answers.items() if answer.complete},
+        content=result if isinstance(result, Stored) else None,
     )
 
 

@@ -9,7 +9,6 @@ from walkerlab.exchange.exported import GaitStart
 from walkerlab.pipeline.plan.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
-from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.provenance import git_commit
 from walkerlab.views.cli.exports import Target, write_file
 from walkerlab.views.cli.request import Request
@@ -47,8 +46,8 @@ def write_model(
         report = execute(config, "fixedpoint", folder, Options(), console)
         if report.no_answer is not None:
             raise report.no_answer
-        assert report.artifact is not None, "a stage with an answer stores it"
-        inputs["fixedpoint"] = artifact.read(report.artifact)
+        assert report.content is not None, "a stage with an answer stores it"
+        inputs["fixedpoint"] = report.content
     start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
     exported = export_model(config, start, kind, adams_law, git_commit(), path.stem, parse_slope(slope))
     for omission in exported.left_out:

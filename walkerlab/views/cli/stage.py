@@ -65,11 +65,11 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
             answers += further_tables(report.stage, own)
         # An artifact without an answer is also stored, but its path would not help the user.
         lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
-    if report.stage in DRAWN_AT_ONCE:
+    if report.stage in DRAWN_AT_ONCE and report.content is not None:
         # Imported here: most stages draw nothing.
         from walkerlab.views.figures.stage import draw_at_once
 
-        figures = draw_at_once(report.stage, report.run_dir, anew=not report.reused)
+        figures = draw_at_once(report.stage, report.content, report.run_dir, anew=not report.reused)
         lines += [f"figure: {path}" for path in figures]
     return [*lines, *omission_lines(request, report)]
 

@@ -256,8 +256,9 @@ def rerun_artifact(path: Path, request: Request) -> None:
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
         report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph)
-        recomputed = None if report.artifact is None else read(report.artifact)
-    before, after = stored.digest(), None if recomputed is None else recomputed.digest()
+    recomputed = report.content
+    before = stored.digest()
+    after = None if recomputed is None else recomputed.digest()
     same_code = recomputed is not None and recomputed.identity.key == stored.identity.key
     value = {
         "stage": stage,

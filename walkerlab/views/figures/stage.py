@@ -12,7 +12,7 @@ from walkerlab.extensions import extensions, load
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.artifact import Identified, Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import make_folder, storing, write_atomically
 from walkerlab.pipeline.store.runs import FIGURES_FOLDER
@@ -49,7 +49,6 @@ def run(
     Raises StorageError if a figure cannot be stored.
     """
     finished = {} if early is None else {entry["svg"]: entry for entry in early.summary["figures"]}
-    make_folder(folder / FIGURES_FOLDER)
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
     progress.start("plot", reasons.count(None))
@@ -74,7 +73,7 @@ def run(
 
 
 def draw(
-    figure: Illustration, results: Mapping[str, Stored], folder: Path, name: str = ""
+    figure: Illustration, results: Mapping[str, Identified], folder: Path, name: str = ""
 ) -> dict[str, str | int | list[str]]:
     """Draw a figure, store it, and return its texts and the paths of its files relative to the run's folder.
 
@@ -82,6 +81,7 @@ def draw(
     """
     drawing = figure.render(results)
     paths = paths_of(name or figure.name)
+    make_folder(folder / FIGURES_FOLDER)
     write_atomically(folder / paths["svg"], drawing.svg)
     write_atomically(folder / paths["png"], drawing.png)
     number = {} if figure.number is None else {"number": figure.number}
@@ -89,12 +89,12 @@ def draw(
     return {**number, **words, **paths, "results": list(figure.stages)}
 
 
-def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
-    """Draw the figures that need only `stage`, redrawing existing ones if `anew`, and return the paths of all SVG
-    files.
+def draw_at_once(stage: str, result: Identified, folder: Path, anew: bool) -> list[Path]:
+    """Draw the figures that need only the result of `stage`, and return the paths of all SVG files.
+
+    anew  whether to redraw figures that exist
     """
-    make_folder(folder / FIGURES_FOLDER)
-    results = {stage: artifact.read(folder / f"{stage}.h5")}
+    results = {stage: result}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     for figure in figures:
         if anew or not all((folder / path).is_file() for path in paths_of(figure.name).values()):

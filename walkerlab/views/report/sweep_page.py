@@ -7,7 +7,7 @@ from typing import Any
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.headlines import HEADLINES
 from walkerlab.pipeline.store.content import Group
-from walkerlab.pipeline.store.files import make_folder, write_atomically
+from walkerlab.pipeline.store.files import write_atomically
 from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.sweep import Swept
@@ -46,7 +46,6 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     paths = []
     pictures = []
     if special is not None:
-        make_folder(folder.figures)
         pictures = [picture(draw_figure(special, {}, folder.path, swept.path.stem), folder.path)]
         paths = [folder.path / path for path in paths_of(swept.path.stem).values()]
     write_atomically(page, render(page_of(swept, pictures, quantities)).encode())

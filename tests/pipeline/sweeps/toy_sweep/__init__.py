@@ -1,1 +1,1 @@
-"""A pipeline whose points are quick, lack an answer, fail, or kill their process."""
+"""A pipeline with points that are quick, lack an answer, fail, or kill their process."""

@@ -1,4 +1,4 @@
-"""Some seeds end the process, each time or only once, one raises, and one needs memory. The others take a moment."""
+"""Depending on the seed, end the process (always or only once), raise an error, need much memory, or take a moment."""
 
 import os
 import signal
@@ -20,7 +20,8 @@ def run(config, inputs, progress):
         os.kill(os.getpid(), signal.SIGKILL)
     if config.seed == GREEDY and "TOY_SWEEP_GREED" in os.environ:
         kept = bytearray(int(os.environ["TOY_SWEEP_GREED"]))
-        kept[:: 1 << 12] = b"x" * len(kept[:: 1 << 12])  # each page, so that the system has to give it
-        time.sleep(5.0)  # until whoever watches the memory has looked
+        # Write into each page, so that the system really provides the memory.
+        kept[:: 1 << 12] = b"x" * len(kept[:: 1 << 12])
+        time.sleep(5.0)  # long enough for whoever watches the memory to notice
     time.sleep(float(os.environ.get("TOY_SWEEP_PAUSE", "0")))
     return Content({}, {"twice": 2 * config.seed})

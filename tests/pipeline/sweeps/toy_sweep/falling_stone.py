@@ -1,4 +1,4 @@
-"""Drop a stone."""
+"""Compute the fall of a stone."""
 
 import math
 import os
@@ -34,7 +34,7 @@ def run(config, inputs, progress):
 
 
 def count(config):
-    """Leave a mark for each point that is computed, where a test asks for it."""
+    """Leave a mark for a computed point if a test has requested it."""
     folder = os.environ.get("TOY_SWEEP_MARKS")
     if folder:
         name = f"{os.getpid()}-{config.gravity_m_s2!r}-{config.slope_rad!r}-{config.walker.hip_mass_kg!r}"

@@ -1,4 +1,4 @@
-"""Let the stone roll on."""
+"""Compute how far the stone rolls after its fall."""
 
 from walkerlab.pipeline.store.content import Content
 

@@ -46,7 +46,7 @@ class Stepping:
 
 
 class Simulation(ABC):
-    """Model in an engine, built in its start state."""
+    """A model in an engine, which starts in a given state."""
 
     def __init__(
         self,

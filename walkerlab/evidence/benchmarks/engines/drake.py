@@ -25,7 +25,7 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED_METHODS = ("runge_kutta3",)  # they adapt their steps unless told not to
+EMBEDDED_METHODS = ("runge_kutta3",)  # methods that adapt their steps by default
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
@@ -149,7 +149,10 @@ class DrakeRun(adapter.Simulation):
 
 
 def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Add bodies, joints and feet. Return joints in the order of coordinates, and geometries of feet and floor."""
+    """Add bodies, joints and feet.
+
+    Returns the joints in the order of the coordinates, and the geometries of feet and floor.
+    """
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -181,7 +184,7 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world with its freedoms, and return the joints."""
+    """Join a link to its parent by a hinge, or the base to the world by a joint for each freedom. Return the joints."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 

@@ -1,4 +1,4 @@
-"""Experiments in other engines, compared with our own solution: same law, own law, and a swing without contact.
+"""Experiments in other engines, compared with our solution: under the same law, under their own, and without contact.
 
 Under the same law, an engine integrates our contact forces. Under its own law, it computes contact by its native model.
 Engines run in separate processes, so that a crash or hang does not stop the stage.
@@ -104,7 +104,7 @@ ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adap
 ERROR_GOAL = 1e-5  # stop refining once the error under our law is below this
 SETTLED_CHANGE = 1e-4  # stop refining once the period on an engine's own contact changes by less (relative)
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
-START_FACTORS = (0.95, 0.99)  # factors on the velocities of the gait, for walks from other starts
+START_FACTORS = (0.95, 0.99)  # factors applied to the velocities of the gait, for walks from other starts
 TUNING_STEP_S = 2e-5
 COMPARED_TOUCHES = 2
 OWN_TOUCHES = 10
@@ -178,7 +178,7 @@ class EngineExperiment:
         """Evaluate a run, or record why it was lost.
 
         integrator  name of the integrator or contact model
-        start       factor on the initial velocities of the gait
+        start       factor applied to the gait's initial velocities
         """
         # Under our law, the errors are those of the end state and of the touch times. On native contact, the error is
         # that of the last period, and only a completed walk from the gait has one.
@@ -232,7 +232,7 @@ def time_our_walk(
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Yield our runs over a ladder of tolerances, then our walks for comparison with native contact of engines."""
+    """Yield rows of our runs at several tolerances, then rows of our walks to compare with engines' native contact."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     # The first walk compiles the kernels, which must not be timed.
     time_our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
@@ -246,7 +246,7 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
-    """Return the step sizes of an integrator or, if it is adaptive, its tolerances, from coarse to fine.
+    """Return the step sizes to try with an integrator, from coarse to fine, or the tolerances if it is adaptive.
 
     steps_s  step sizes (s) for fixed steps
     """
@@ -271,7 +271,7 @@ class EngineOnScene:
 
         label   name of the integrator or contact model in the row
         native  the engine's native contact, or None for our law
-        start   factor on the gait's initial velocities
+        start   factor applied to the gait's initial velocities
         """
         law, until_s = (SAME_LAW, self.truth.until_s) if native is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.scale_start(start)
@@ -376,7 +376,10 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """Integrate the swing by our equations and SciPy's DOP853. Return end state and function energy(state) (J)."""
+    """Integrate the swing by our equations and SciPy's DOP853.
+
+    Returns the end state, and a function for the energy (J) of a state.
+    """
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)

@@ -97,14 +97,14 @@ class RuleFollower:
         self.turn: Turn | None = None
         self.watches = True
         self._feet: Feet
-        self._see(scene, q, v)
+        self._switch_to(scene, q, v)
         # Both feet stand on the ground. Rounding may put them slightly above it, which would count as a lift.
         first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
         self._feet = first, second
         self._edges = [edges_under(scene.ground.terrain, foot, self.walk_state.cells[foot]) for foot in range(2)]
 
-    def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Follow the model of a scene from coordinates q and velocities v on."""
+    def _switch_to(self, scene: EngineScene, q: Floats, v: Floats) -> None:
+        """Switch to the model of a scene, in the state with coordinates q and velocities v."""
         self.scene = scene
         self.probe = WalkerProbe(scene, self._ground, self.walk_state)
         self._feet = self.probe.feet(q, v)
@@ -128,11 +128,7 @@ class RuleFollower:
                 if self.turn is not None:
                     return False
             self._bends = bends
-        # whether a foot has crossed the ground or a pad's edge, or passed the other
-        (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
-        (left0, right0), (left1, right1) = self._edges
-        happened = (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1)
-        happened = happened or not (left0 <= y0 < right0 and left1 <= y1 < right1)
+        happened = has_event(before, now, self._edges)
         if happened:
             self._apply_events(time_s, before, now, q, v)
         self._feet = now
@@ -201,7 +197,7 @@ class RuleFollower:
         self.turn = None
         scene = self.scene.lock_knees(walk_state.knee)
         q, v = scene.from_base(tuple(y.tolist()))
-        self._see(scene, q, v)
+        self._switch_to(scene, q, v)
         return q, v
 
     def _end(self, outcome: int) -> None:
@@ -226,6 +222,15 @@ class RuleFollower:
             self._end(Outcome.FELL)
         elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(Outcome.NO_HEEL_STRIKE)
+
+
+def has_event(before: Feet, now: Feet, edges: list[tuple[float, float]]) -> bool:
+    """Whether a foot has crossed the ground or an edge (m) of its pad or gap, or passed the other foot."""
+    (x0, h0, *_), (x1, h1, *_), (y0, k0, *_), (y1, k1, *_) = *before, *now
+    (left0, right0), (left1, right1) = edges
+    if (h0 < 0.0) != (k0 < 0.0) or (h1 < 0.0) != (k1 < 0.0) or (x0 < x1) != (y0 < y1):
+        return True
+    return not (left0 <= y0 < right0 and left1 <= y1 < right1)
 
 
 def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float, q: Floats, v: Floats) -> bool:
@@ -281,7 +286,7 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
             low = middle
         else:
             high = middle
-    # Return the end on the far side of zero, where the foot has certainly crossed.
+    # At this end of the bracket the foot has certainly crossed zero.
     return high
 
 

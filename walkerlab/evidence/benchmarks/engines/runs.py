@@ -290,7 +290,7 @@ class TuningTask:
         settled = self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
-        # Before its last fifth the block still settles into the ground.
+        # Before the last fifth of the motion, the block is still settling into the ground.
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))

@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab import __version__
 from walkerlab.config.reads import ContactConfig, SceneConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_omissions, plain_power
 from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene, OwnProcess, TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
@@ -84,7 +84,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     Raises NoAnswer if no engine is installed, or if our walk ends too early.
     """
     engines = installed()
-    findings = EngineFindings(left_out=[*missing_engines(), *pinning_left_out(config, "engines")])
+    findings = EngineFindings(left_out=[*missing_engines(), *pinning_omissions(config, "engines")])
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
@@ -149,7 +149,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 def make_content(
     findings: EngineFindings, scene: str, truth: experiments.Truth, rigid: Mapping[str, Any] | None
 ) -> Content:
-    """Build groups and summary.
+    """Build the groups and the summary of the stage's result.
 
     rigid  summary of `fixedpoint`, or None if neither the start nor the pads need a gait
     """
@@ -227,7 +227,7 @@ def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """Return the largest step (s) that gives three correct digits of the last period, by experiment and name."""
+    """Return the largest step (s) with three correct digits of the last period, by experiment and name of series."""
     # Under our law the digits are those of the reference. Native contact has no reference but the finest run.
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
@@ -241,7 +241,7 @@ def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[st
 
 
 def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float | None) -> float | None:
-    """Return the largest step (s) up to which all runs have three correct digits, or None if no step size has."""
+    """Return the largest step (s) up to which all runs have three correct digits, or None if there is no such step."""
     good = None
     if target is None:
         return None
@@ -255,9 +255,9 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
 
 
 def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
-    """Return the effect of the last refinement of each series, by experiment and name.
+    """Return the effect of the last refinement of each series, by experiment and name of the series.
 
-    Under our law it is the factor by which the error fell, on native contact the change of the period (s).
+    Under our law it is the factor by which the error fell, and on native contact the change of the period (s).
     """
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
