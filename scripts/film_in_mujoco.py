@@ -21,7 +21,7 @@ RATE_HZ, LATE_S, CLOCK_RATE, ERROR_DEG = 120.0, 0.25, 1.002, 0.15
 
 
 def film():
-    """Return time (frames,) in s and angles (frames, 2) in rad, those of the first swing leg first."""
+    """Return time (frames,) in s and angles (frames, 2) in rad, beginning with the leg that swings first."""
     with tempfile.TemporaryDirectory() as folder:
         path, *_ = walkerlab.export_model(Path(folder) / "paper.xml", slope_rad=SLOPE_RAD, strides=STRIDES)
         model = mujoco.MjModel.from_xml_path(str(path))

@@ -122,7 +122,7 @@ def test_level_camera_has_no_estimated_tilt(tmp_path):
     assert abs(tilt) < 0.05
 
 
-def test_free_tilt_and_a_free_offset_are_one_unknown():
+def test_free_tilt_excludes_a_free_offset():
     with pytest.raises(ConfigError, match="camera_tilt_deg: free estimates already"):
         load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[angle_offset_rad]"))
     block = load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[clock_rate]")).config.identify
@@ -408,7 +408,7 @@ def test_sports2d_levels_the_floor_and_says_so(walks, sign, tmp_path):
 
 
 @pytest.mark.parametrize("apart_m", [0.0, 0.05])
-def test_legs_that_do_not_meet_at_one_hip_are_doubted(apart_m, tmp_path):
+def test_legs_that_do_not_meet_at_one_hip_raise_a_doubt(apart_m, tmp_path):
     time, angle = sampled()
     hip, *feet = places_of(angle)[:, :, :2].swapaxes(0, 1)
     other = np.c_[apart_m * np.sin(2.0 * np.pi * time), 0.0 * time]
