@@ -396,7 +396,7 @@ def test_frame_numbers_without_a_frame_rate_are_refused(tmp_path):
     [
         ("", "is empty"),
         ("\n \n", "is empty"),
-        ("time (s),angle 1 (rad),angle 2 (rad)\n", "has a header and no rows of numbers"),
+        ("time (s),angle 1 (rad),angle 2 (rad)\n", "has a header but no rows of numbers"),
         (table(delimiter="|"), "separates its columns by vertical bars"),
         (table(header=("time", "angle_1", "angle_2"), delimiter=" "), "separates its columns by blanks"),
     ],

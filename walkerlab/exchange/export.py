@@ -86,12 +86,12 @@ def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Ch
 
 
 def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names, as `choose` does."""
+    """Return the ADAMS contact law that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, CONTACT_LAWS, "--law", "contact law")
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way of expressing a slope that `text` names, as `choose` does."""
+    """Return the way to express a slope that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
@@ -123,7 +123,7 @@ def parts_left_out(export: exported.Exported, config: "Config", kind: Kind, law:
         # The configs differ only if `add_stops` has replaced an ideal lock.
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
-        when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
+        when = "act at the touch times of walkerlab's walk, because ADAMS functions have no memory"
         if any(export.impulses_N_s):
             yield f"the trigger of push-offs; open-loop pulses {when}"
         if export.hip.torque_N_m:

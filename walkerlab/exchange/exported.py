@@ -92,7 +92,7 @@ class Exported:
 
     @property
     def hip_link(self) -> int:
-        """Index of the link that hangs from the base's hip: the leg that swings first."""
+        """Index of the link that is hinged to the base at the hip. It belongs to the leg that swings first."""
         upper = self.scene.assembly.legs[1 - STANCE_FOOT][0]
         return [link.name for link in self.model.links].index(upper)
 
@@ -104,7 +104,9 @@ class Exported:
 
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
-        """Weights of hinge angles, by link, for each body that follows others. Each weighted sum is zero."""
+        """Weights of hinge angles, by link, for each body that follows others. The weighted sum of its hinge angles is
+        zero.
+        """
         weights = []
         for row in planar.coupling_rows(self.scene.assembly, self.model):
             # Relative angles suffice only if the weights add up to 1, because then the angle of the base drops out.

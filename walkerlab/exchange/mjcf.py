@@ -161,7 +161,7 @@ def body_text(
 ) -> str:
     """Write a link with its hinge, feet and child links.
 
-    contact  settings of the foot contacts; None for a walker without feet
+    contact  settings of the foot contacts, or None for a walker without feet
     hinges   hinges that have a name, by the link below the hinge
     """
     link = model.links[link_number]

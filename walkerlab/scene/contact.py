@@ -22,8 +22,7 @@ from walkerlab.physics.orbits import contact_map, scaled_starts, step_map
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.laws import ground_law, hinge_law_of
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters, ground_law, hinge_law_of
 from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:

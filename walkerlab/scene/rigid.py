@@ -14,7 +14,7 @@ from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 from walkerlab.physics.solvers import registry, system
-from walkerlab.scene import laws, parts, studies
+from walkerlab.scene import parts, studies
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations, Output
@@ -94,7 +94,7 @@ def level_walker(walker: walkers.Walker, gravity: float) -> RigidModel:
 
     Raises ConfigError if the parts are not a valid walker.
     """
-    law = laws.hinge_law_of(walker)
+    law = parts.hinge_law_of(walker)
     assembly = parts.assembly_of(walker, rigid=True)
     try:
         return rigid_on_level_ground(assembly, gravity, parts.knee_locked_at_strike(walker), law)

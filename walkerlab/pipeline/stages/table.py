@@ -29,7 +29,7 @@ def check_laws(config: "Config") -> None:
     """Raise ConfigError for an incomplete law of another package, before anything is compiled."""
     contact = config.contact
     if config.walker.hip.hinge_law not in WORDS["hinge_law"]:
-        load("walkerlab.scene.laws:hinge_law_of")(config.walker)
+        load("walkerlab.scene.parts:hinge_law_of")(config.walker)
     if contact is not None and any(getattr(contact, key) not in WORDS[key] for key in ("normal_force", "friction")):
         load("walkerlab.scene.contact:ground_laws")(contact)
 
