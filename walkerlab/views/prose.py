@@ -1,7 +1,5 @@
 """Texts kept as Jinja templates, with a file per subject and a macro per paragraph."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,7 +39,7 @@ class Prose:
     known: Mapping[str, Any]  # global variables of the templates
 
     @cached_property
-    def templates(self) -> Environment:
+    def templates(self) -> "Environment":
         # Imported here: commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

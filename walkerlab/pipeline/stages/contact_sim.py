@@ -12,8 +12,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_energies, sample_feet
 from walkerlab.physics.mechanics.parts import hinge_point
-from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.physics.solvers.system import Floats
+from walkerlab.physics.solvers import registry, system
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import (
     STRIDE,
@@ -29,10 +28,8 @@ from walkerlab.pipeline.stages.walk import (
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
-from walkerlab.scene import contact
-from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene import contact, omissions, rigid
 from walkerlab.scene.parts import TORSO
-from walkerlab.scene.rigid import foothold_heights
 
 MAX_TOLERANCE_RATIO = 0.1  # above this ratio of tolerance to stiction velocity, slips are not resolved
 SCUFFED = (
@@ -54,10 +51,10 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     steps = 2 * config.strides
     tolerances = contact.tolerances_of(config, steps)
     interval = scene.ground.frame.pendulum_time / contact.SAMPLES_PER_PENDULUM_TIME if config.outputs else None
-    heights = foothold_heights(config.ground, steps + 1)
+    heights = rigid.foothold_heights(config.ground, steps + 1)
     warn_of_unresolved_slip(tolerances.atol, scene, progress)
 
-    def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
+    def walk(tolerances: registry.Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
         result = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
         progress.advance()
@@ -111,11 +108,11 @@ def summary(config: ContactSimConfig, scene: contact.ContactScene, walk: Contact
         "jacobians": walk.work.jacobians,
         "slope_rad": scene.walker.slope,
         **contact.scene_measures(scene),
-        "left_out": list(contact_walk_omissions(config)),
+        "left_out": list(omissions.contact_walk_omissions(config)),
     }
 
 
-def mean_of(values: Floats) -> float | None:
+def mean_of(values: system.Floats) -> float | None:
     """Return the mean over steps, or None if no step was completed."""
     return float(np.mean(values)) if values.size else None
 
@@ -170,7 +167,7 @@ def trajectory_group(
     return Group(variables)
 
 
-def state_variables(scene: contact.ContactScene, y: Floats) -> dict[str, Variable]:
+def state_variables(scene: contact.ContactScene, y: system.Floats) -> dict[str, Variable]:
     """Return the motion of legs, shanks and torso, and the positions of hip and knees."""
     walker = scene.walker
     layout = scene.walker.whole
@@ -203,7 +200,7 @@ def state_variables(scene: contact.ContactScene, y: Floats) -> dict[str, Variabl
 
 
 def energy_variables(
-    scene: contact.ContactScene, samples: ContactSamples, foothold: Floats, up: Floats
+    scene: contact.ContactScene, samples: ContactSamples, foothold: system.Floats, up: system.Floats
 ) -> dict[str, Variable]:
     """Return energies relative to the current foothold, as in the paper, and the energy balance from a fixed origin.
 

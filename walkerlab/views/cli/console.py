@@ -1,7 +1,5 @@
 """Messages and progress on stderr: bars on a terminal, otherwise occasional lines."""
 
-from __future__ import annotations
-
 import bisect
 import contextlib
 import sys
@@ -41,7 +39,7 @@ class Console:
         self._pulse: threading.Event | None = None
         self._lock = threading.RLock()
 
-    def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageLine:
+    def begin(self, stage: str, place: str, expected_s: float | None = None) -> "StageLine":
         line = StageLine(self, stage, place, expected_s)
         with self._lock:
             self.running.append(line)
@@ -55,7 +53,7 @@ class Console:
                     threading.Thread(target=self._talk, args=(self._pulse,), daemon=True).start()
         return line
 
-    def ended(self, line: StageLine, message: str) -> None:
+    def ended(self, line: "StageLine", message: str) -> None:
         with self._lock:
             if line in self.running:
                 self.running.remove(line)
@@ -120,7 +118,7 @@ class Console:
             if time.monotonic() - self._said_at >= MAX_SILENCE_S:
                 self._say("; ".join(line.describe() for line in self._lines()))
 
-    def _lines(self) -> Iterator[StageLine]:
+    def _lines(self) -> "Iterator[StageLine]":
         with self._lock:
             yield from tuple(self.running)
 
@@ -134,7 +132,7 @@ class Console:
         self._live = Live(get_renderable=self._bars, console=Terminal(stderr=True), transient=True)
         self._live.start()
 
-    def _bars(self) -> Table:
+    def _bars(self) -> "Table":
         from rich.progress_bar import ProgressBar
         from rich.table import Table
         from rich.text import Text

@@ -1,7 +1,5 @@
 """Commands on stored results, configs and extensions: status, show, diff, schema, extensions, clean."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 from dataclasses import replace
@@ -130,13 +128,13 @@ def diff(
     print_result(request, comparison_object(folders, comparison, figures), output)
 
 
-def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+def run_labels(folders: "tuple[RunFolder, RunFolder]") -> tuple[str, str]:
     """Return labels of two runs: their names or, if these are equal, their folders."""
     first, second = folders
     return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
 
 
-def draw_both(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
+def draw_both(folders: "tuple[RunFolder, RunFolder]", results: list[dict[str, Any]]) -> list[Path]:
     """Draw both runs' walks overlaid, store the images in the first run's figures folder, and return their paths."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import draw_runs
@@ -152,7 +150,7 @@ def draw_both(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]
 
 
 def comparison_object(
-    folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path]
+    folders: "tuple[RunFolder, RunFolder]", found: "RunDifference", figures: list[Path]
 ) -> dict[str, Any]:
     return {
         "stage": "diff",
@@ -166,7 +164,7 @@ def comparison_object(
 
 
 def comparison_lines(
-    folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
+    folders: "tuple[RunFolder, RunFolder]", comparison: "RunDifference", figures: list[Path], every: bool
 ) -> list[str]:
     """Describe changed config keys, and the headline values of changed stages or, with `every`, all changed values."""
     from walkerlab.views.report.numbers import number
@@ -197,13 +195,13 @@ def comparison_lines(
     return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
 
 
-def differs(pair: Pair) -> bool:
+def differs(pair: "Pair") -> bool:
     if pair.change is not None:
         return abs(pair.change) > SAME_CHANGE
     return bool(pair.first != pair.second)
 
 
-def percent(pair: Pair) -> str:
+def percent(pair: "Pair") -> str:
     """Format a relative change in percent, or return '' for error measures and for values at rounding level."""
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
