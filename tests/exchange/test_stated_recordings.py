@@ -271,7 +271,7 @@ def test_part_of_a_recording_can_be_read(tmp_path):
     summary = read(tmp_path, time, angle, from_s=1.0, to_s=4.0)
     assert summary["first_heel_strike_s"] == pytest.approx(2.0 * PERIOD_S, abs=1e-4)
     assert summary["steps"] == 3
-    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s; its times go from 0 to 5\.27 s") as refused:
+    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s: its times go from 0 to 5\.27 s") as refused:
         read(tmp_path, time, angle, from_s=9.0)
     assert "--from-s" in refused.value.advice
 
