@@ -184,7 +184,9 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
 
 
 def variable_film():
-    """Times (frames,) and noisy angles of a film whose rate falls from 60 to 30 and 24 frames/s and rises again."""
+    """Return times (frames,) and noisy angles of a film whose rate falls from 60 to 30 and 24 frames/s and
+    rises again.
+    """
     times = [0.0]
     while times[-1] < 7.4 * PERIOD_S:
         slow = 24.0 if times[-1] > 3.0 else 30.0
@@ -194,7 +196,7 @@ def variable_film():
 
 
 def constant_rate(time, fps):
-    """Times of a film that ffmpeg converted to a constant rate, and the frame that it shows at each of them."""
+    """Return the times of a film that ffmpeg converted to a constant rate, and the frame that it shows at each time."""
     converted = np.arange(0.0, time[-1], 1.0 / fps)
     return converted, np.searchsorted(np.floor(fps * time + 0.5), np.arange(converted.size), "right") - 1
 
