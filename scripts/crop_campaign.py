@@ -23,9 +23,9 @@ from walkerlab.errors import ConfigError
 
 FRAME_RATES = (25.0, 30.0, 50.0, 60.0, 100.0, 120.0, 240.0, 1000.0)  # frames/s
 NOISES_DEG = (0.0, 0.01, 0.05, 0.1)
-NEAR_S = 0.02  # half of the cuts are this near to a heel strike
+NEAR_S = 0.02  # half of the cuts are at most this far from a heel strike
 STRIKES_S = PERIOD_S * np.arange(9)
-MARGIN_S = 0.03  # strikes nearer to an end are not counted
+MARGIN_S = 0.03  # strikes that are nearer to an end do not count
 
 
 class Crop(NamedTuple):
@@ -33,7 +33,7 @@ class Crop(NamedTuple):
     end_s: float
     fps: float
     noise_rad: float
-    gap_s: float  # time of a gap of 30 ms; negative for no gap
+    gap_s: float  # time of a gap of 30 ms, or negative if there is none
 
 
 class Count(NamedTuple):
@@ -41,8 +41,8 @@ class Count(NamedTuple):
 
     missed: int
     invented: int
-    errors: list[float]  # errors of the strikes, in their stated standard errors
-    problem: str  # message of a refusal
+    errors: list[float]  # errors of the strikes, as multiples of their stated standard errors
+    problem: str  # message if the recording is refused
 
 
 def draw(rng: np.random.Generator) -> Crop:

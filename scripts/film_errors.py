@@ -1,4 +1,4 @@
-"""Film a walk by simulated cameras, and print a table of the errors of what is read: periods, step lengths, estimates.
+"""Film a walk with simulated cameras, and print the errors of the periods, step lengths and estimates that are read.
 
 Usage: python scripts/film_errors.py [fit]
 
@@ -26,11 +26,13 @@ from walkerlab.scene.rigid import rigid_walker
 CONFIG, STEPS, DENSE_HZ = "slope-3deg", 10, 4800.0
 FRAME_RATES, NOISES_DEG = (30.0, 60.0, 120.0, 240.0), (0.1, 0.3, 1.0)
 DISTORTION, EXPOSURE, WIDTH_M = 0.01, 0.5, 5.0
-"""Shift at the edge of the picture, relative; share of a frame's time; width of the picture."""
+"""Relative distortion at the edge of the picture, exposure as a fraction of the time of a frame, and width of the
+picture.
+"""
 
 
 def filmed_angles(angle, leg_m, length_m, touches, time):
-    """Return the angles (samples, 2) as a lens shows them that distorts the places of hip and feet."""
+    """Return the angles (samples, 2) as seen through a lens that distorts the positions of hip and feet."""
     step = np.clip(np.searchsorted(touches, time, "right") - 1, 0, STEPS - 1)
     stance = np.where(step % 2 == 0, 1, 0)
     feet = np.stack((np.sin(angle), -np.cos(angle)), axis=2) * leg_m
@@ -47,7 +49,7 @@ def filmed_angles(angle, leg_m, length_m, touches, time):
 
 
 def film(config, fps, noise_deg, path):
-    """Write a film, and return the walk's periods (steps,) and step length (m)."""
+    """Write a film, and return the periods (steps,) and the step length (m) of the walk."""
     gait = run_in_memory("fixedpoint", config).summary
     rng = np.random.default_rng(1)
     time, angle, touches = measure_angles(rigid_walker(config), np.array(gait["state"]), rng, STEPS, 0.0, 0.0, DENSE_HZ)
@@ -58,7 +60,7 @@ def film(config, fps, noise_deg, path):
     count = (time.size - blur) // frame
     frames = np.array([seen[k * frame : k * frame + blur].mean(axis=0) for k in range(count)])
     frames = np.degrees(frames) + rng.normal(0.0, noise_deg, frames.shape)
-    # the time of a frame is the middle of its exposure
+    # The time of a frame is the middle of its exposure.
     times = np.arange(count) / fps + 0.5 * (blur - 1) / DENSE_HZ
     rows = "\n".join(f"{t:.5f},{a:.4f},{b:.4f}" for t, (a, b) in zip(times, frames, strict=True))
     path.write_text(f"time (s),angle 1 (deg),angle 2 (deg)\n{rows}\n", encoding="utf-8")

@@ -3,8 +3,7 @@
 Usage: python scripts/film_in_mujoco.py [FILE, film.csv by default]
 
 MuJoCo steps the exported model with its own contact. The film begins within a step, its clock is fast by 0.2 %, and its
-angles, in degrees, have errors of 0.15 degrees. docs/downloads/film.csv was made before the export's contact got its
-present friction: angles of a new film differ from it by up to 0.24 degrees.
+angles, in degrees, have errors of 0.15 degrees. MuJoCo 4.0 made docs/downloads/film.csv.
 """
 
 import math
@@ -22,7 +21,7 @@ RATE_HZ, LATE_S, CLOCK_RATE, ERROR_DEG = 120.0, 0.25, 1.002, 0.15
 
 
 def film():
-    """Return time (frames,) in s and angles (frames, 2) in rad, those of the first swing leg first."""
+    """Return time (frames,) in s and angles (frames, 2) in rad, beginning with the leg that swings first."""
     with tempfile.TemporaryDirectory() as folder:
         path, *_ = walkerlab.export_model(Path(folder) / "paper.xml", slope_rad=SLOPE_RAD, strides=STRIDES)
         model = mujoco.MjModel.from_xml_path(str(path))

@@ -47,17 +47,20 @@ WALKERS = {
     "kneed": ("slope_deg", "walker.shank.length_m"),
 }
 STEPS, NOISE, ANGLE_NOISE, PRIOR = 20, (1e-3, 1e-3), 2e-3, 0.01
-"""Steps of a walk; s for a leg of 1 m on Earth, and leg lengths; rad; shares of the last parameter's value."""
+"""Number of steps, and noise: of periods (s, for a leg of 1 m on Earth) and lengths (leg lengths), of angles (rad), and
+of the last parameter (relative).
+"""
 
 DISTURBANCE, DISTURBANCES = (0.01, 1e-4), {"simplest": (0.002, 5e-5)}
-"""Of the start, in shares of the gait's coordinates, and of the floor, in leg lengths; the simplest walker survives
-less.
+"""Disturbance of the start, as a fraction of the coordinates of the gait, and of the floor, in leg lengths. They are
+smaller for the simplest walker, which survives less.
 """
 
 
 KICK, RAMP, WAVE, PUSH, MIDDLE = 2e-3, 1e-4, 7.0, 5e-4, 0.4
-"""Changes of the rates at heel strikes, as a fraction of the rates; largest change of a varying slope's rise per step,
-in leg lengths; steps of its wave; pushes, as a fraction of m sqrt(g l), and when in a gait's step they come.
+"""Other disturbances: changes of the rates at heel strikes (relative), the largest change in the rise per step of a
+varying slope (leg lengths), the wavelength of the slope (steps), and pushes, as a fraction of m sqrt(g l), with their
+time as a fraction of a step.
 """
 
 
@@ -220,7 +223,7 @@ def coverage(truth, seeds):
 
 
 def coverage_on_all_cores(name, level, walks, disturbed_by, noise):
-    """Return the same for seeds 0 to walks, with a process for each core."""
+    """Return the same for the seeds below `walks`, with a process for each core."""
     cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
     with ProcessPoolExecutor(cores) as pool:
         tasks = [(name, level, disturbed_by, noise, range(core, walks, cores)) for core in range(cores)]

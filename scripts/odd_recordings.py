@@ -1,6 +1,6 @@
 """Read recordings that are damaged or odd in many ways, and print each that ends in a traceback.
 
-Every file is made from a right one by a random change of its bytes, cells, rows, header or options.
+Every file is made from an intact one by random changes of bytes, cells, rows, header or options.
 
     python scripts/odd_recordings.py [COUNT] [SEED]
 """
@@ -54,7 +54,7 @@ SOURCES = (
 
 
 def tables() -> dict[str, str]:
-    """Return right files by name."""
+    """Return intact files by name."""
     time, angle = sampled(fps=60.0)
     places = places_of(angle, fps=60.0)
     own = "\n".join(f"{t:.5f},{a:.6f},{b:.6f}" for t, (a, b) in zip(time, angle, strict=True))
@@ -173,7 +173,7 @@ def main() -> None:
                 ends["read"] += 1
             except (ConfigError, NoAnswer):
                 ends["refused"] += 1
-            except Exception:  # a traceback is what is looked for
+            except Exception:  # The script looks for tracebacks.
                 ends["traceback"] += 1
                 print(number, name, change.__name__, options, columns, flush=True)
                 print("".join(traceback.format_exc().splitlines(keepends=True)[-5:]), flush=True)

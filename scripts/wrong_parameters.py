@@ -1,4 +1,4 @@
-"""Identify walkers whose fixed parameter is wrong, and count how often the answer warns where it must.
+"""Identify walkers with a wrong fixed parameter, and count how often the answer warns when it must.
 
 Usage: python scripts/wrong_parameters.py [WALKS, 100 by default] [steps | angles] [--first SEED] [--right]
        [--guess SHARE]
@@ -25,11 +25,12 @@ from walkerlab.scene.identification import identify_walk
 KEYS = ("slope_deg", "walker.leg_length_m", "walker.hip_mass_kg")
 SHARES = (0.02, -0.02, 0.05, -0.05, 0.12, -0.12)
 WALKERS = ("paper", "slope-3deg")
-OFF, DECISIVE = 2.0, 3.0  # standard errors; gain of the log-likelihood
+# error of an estimate in standard errors, and gain of the log-likelihood, above which a warning must appear
+OFF, DECISIVE = 2.0, 3.0
 
 
 def verdict_of(name, truth, measured, wrong, share, guesses=(0.0, 0.0, 0.0)):
-    """Return whether the answer must warn, whether it does, and a line about it."""
+    """Return whether the answer must warn, whether it does, and a line that describes the case."""
     values = dict(zip(KEYS, truth.values, strict=True))
     shares = dict(zip(KEYS, guesses, strict=True)) | {wrong: share}
     config = load(Path(name), tuple(f"{key}={values[key] * (1.0 + shares[key])}" for key in KEYS)).config

@@ -348,7 +348,7 @@ def test_omitted_keys_keep_their_defaults():
     assert walkerlab.contact(friction="none", pad_pitch=0.2).pad_pitch == 0.2
 
 
-def test_result_values_are_attributes_and_items():
+def test_result_values_can_be_read_as_attributes_and_items():
     walk = walkerlab.simulate(strides=1)
     assert walk.outcome == walk["outcome"] == walk.summary["outcome"]
     assert walk.last_step_period_s == walk["last_step_period_s"] == walk.summary["step_periods_s"][-1]

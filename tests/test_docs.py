@@ -27,7 +27,7 @@ from walkerlab.physics.ground.friction import FRICTION_LAWS, friction_coefficien
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.laws import missing_members
+from walkerlab.scene.parts import missing_members
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration
 

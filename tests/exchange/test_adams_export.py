@@ -108,7 +108,7 @@ def test_exported_masses_and_gravity_match_the_model(seed):
 
 @pytest.mark.parametrize("law", ["contact.full_damping_penetration=20", "contact.exponent=1.0"])
 @pytest.mark.parametrize("seed", range(len(WALKERS)), ids=WALKERS)
-def test_exported_forces_equal_the_models(seed, law):
+def test_exported_forces_equal_those_of_the_model(seed, law):
     walker = (*random_walker(seed), law)
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     without = without_forces(dataset_of("functions", *walker))
@@ -200,7 +200,7 @@ def test_ideal_knee_lock_is_exported_to_adams_as_a_stop():
     assert ideal_text == compliant_text
 
 
-def test_view_script_has_the_commands_of_the_command_file():
+def test_adams_view_script_has_the_commands_of_the_command_file():
     _, commands = files_of("adm", "functions", "kneed", "strides=1").files.values()
     text = files_of("cmd", "functions", "kneed", "strides=1").files["kneed.cmd"]
     script = re.sub(r"\s*&\n\s*", " ", text).splitlines()[-1]
@@ -263,7 +263,7 @@ def test_adams_result_names_match_recording_columns():
     assert found["torso_velocity"] == "walker.torso_velocity"
 
 
-def test_commands_run_a_pinned_first_step_and_release_it():
+def test_commands_simulate_a_pinned_first_step_and_then_release_the_foot():
     exported = files_of("adm", "functions", "paper", "contact.stance=pinned")
     dataset, commands = (text.splitlines() for text in exported.files.values())
     first = export_of("paper", "contact.stance=pinned").touches_s[0]

@@ -25,7 +25,7 @@ def test_no_strike_of_a_cropped_recording_is_missed_invented_or_far_off(tmp_path
     assert max(error for each in counts for error in each.errors) < 5.0
 
 
-def test_error_bar_of_a_strike_just_after_the_start_holds(tmp_path):
+def test_error_bar_of_a_strike_just_after_the_start_contains_its_error(tmp_path):
     """The few samples before the strike must not distort the fit of those after it."""
     crops = campaign()
     for crop in (crops.Crop(1.39467, 4.218, 240.0, 1.75e-3, -1.0), crops.Crop(0.69340, 3.98, 25.0, 1.75e-4, -1.0)):

@@ -453,7 +453,7 @@ def test_95_percent_of_strikes_lie_within_two_standard_errors(fps, tmp_path):
 
 
 @pytest.mark.parametrize(("fps", "noise_deg", "seed"), [(240.0, 0.3, 2), (240.0, 0.7, 3), (120.0, 1.0, 0)])
-def test_noise_of_a_film_neither_hides_a_strike_nor_speaks_against_the_clock(fps, noise_deg, seed, tmp_path):
+def test_noise_of_a_film_neither_hides_a_strike_nor_raises_a_doubt_about_the_clock(fps, noise_deg, seed, tmp_path):
     """Rates must not come from a spline that follows the noise: the legs would seem to swing half as fast."""
     summary = read(tmp_path, *sampled(begin=0.1, fps=fps, noise=math.radians(noise_deg), seed=seed))
     assert summary["steps"] == 6

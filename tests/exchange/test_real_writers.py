@@ -45,7 +45,7 @@ def write_with_ezc3d(path, markers, units=("mm",), residuals=None):
 
 
 @pytest.mark.parametrize("units", [("mm",), ()])
-def test_blank_and_repeated_c3d_labels_do_not_matter(units, tmp_path):
+def test_blank_and_repeated_c3d_labels_are_harmless(units, tmp_path):
     path = tmp_path / "walk.c3d"
     spare = [("", 0.0 * HIP), ("*1", HIP), ("", HIP)]
     write_with_ezc3d(path, [*spare, *MARKERS.items(), ("*1", 2.0 * HIP)], units)
@@ -233,7 +233,7 @@ def angles_of_sports2d(process, walks, side):
 
 
 @pytest.mark.parametrize(("walks", "side"), [("right", "right"), ("right", "none"), ("left", "left"), ("left", "none")])
-def test_angles_of_sports2d_are_from_the_horizontal_and_the_floor(walks, side, tmp_path):
+def test_sports2d_angles_are_measured_from_the_horizontal_and_the_floor(walks, side, tmp_path):
     process, pandas = sports2d()
     table = pandas.DataFrame(angles_of_sports2d(process, walks, side), columns=["right thigh", "left thigh"])
     process.make_mot_with_angles(table, pandas.Series(sampled()[0]), str(tmp_path / "walk.mot"))
@@ -243,7 +243,7 @@ def test_angles_of_sports2d_are_from_the_horizontal_and_the_floor(walks, side, t
 
 
 @pytest.mark.parametrize("level", [True, False])
-def test_markers_of_sports2d_are_from_the_floor_where_they_are_in_metres(level, tmp_path):
+def test_sports2d_markers_in_metres_are_measured_from_the_floor(level, tmp_path):
     process, pandas = sports2d()
     names, columns = ["RHip", "RAnkle", "LAnkle"], {"angle 1": "RHip>RAnkle", "angle 2": "RHip>LAnkle"}
     parts = []

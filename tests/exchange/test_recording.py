@@ -184,7 +184,7 @@ def test_sample_missing_from_a_used_column_is_omitted(tmp_path):
         ("walk.res", RES.replace('id="3"', 'id="2"'), "not unique"),
         ("walk.res", RES.replace('id="3"', 'id="x"'), "no id"),
         ("walk.res", RES.replace("dynamic_", "modelInput_"), "no simulation steps"),
-        ("walk.res", RES.replace(f"{TIMES[1]}\n", f"{TIMES[1]}\n1 "), "step 2 holds 4 numbers for 3"),
+        ("walk.res", RES.replace(f"{TIMES[1]}\n", f"{TIMES[1]}\n1 "), "step 2 has 4 numbers for 3"),
         ("walk.res", RES.replace(f"{TIMES[1]}\n", "one\n"), "not a number"),
         ("walk.sto", STO.replace("endheader", "end"), "endheader"),
         ("walk.sto", STO.replace("version=1", "DataType=Vec3"), "type vec3"),

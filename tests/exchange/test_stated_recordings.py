@@ -122,7 +122,7 @@ def test_level_camera_has_no_estimated_tilt(tmp_path):
     assert abs(tilt) < 0.05
 
 
-def test_free_tilt_and_a_free_offset_are_one_unknown():
+def test_free_tilt_excludes_a_free_offset():
     with pytest.raises(ConfigError, match="camera_tilt_deg: free estimates already"):
         load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[angle_offset_rad]"))
     block = load(Path("paper"), ("identify.camera_tilt_deg=free", "identify.nuisance=[clock_rate]")).config.identify
@@ -183,6 +183,46 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
     assert summary["doubts"] == ["The file's times, 30 frames/s, are replaced by 240 frames/s."]
 
 
+def variable_film():
+    """Return times (frames,) and noisy angles of a film whose rate falls from 60 to 30 and 24 frames/s and
+    rises again.
+    """
+    times = [0.0]
+    while times[-1] < 7.4 * PERIOD_S:
+        slow = 24.0 if times[-1] > 3.0 else 30.0
+        times.append(times[-1] + 1.0 / (slow if 1.5 <= times[-1] <= 4.5 else 60.0))
+    time = np.array(times[:-1])
+    return time, angles_at(time) + math.radians(0.15) * np.random.default_rng(0).standard_normal((time.size, 2))
+
+
+def constant_rate(time, fps):
+    """Return the times of a film that ffmpeg converted to a constant rate, and the frame that it shows at each time."""
+    converted = np.arange(0.0, time[-1], 1.0 / fps)
+    return converted, np.searchsorted(np.floor(fps * time + 0.5), np.arange(converted.size), "right") - 1
+
+
+def test_film_of_variable_rate_needs_the_time_of_each_frame(tmp_path):
+    time, angle = variable_film()
+
+    def error_and_doubts(times, rows):
+        summary = read(tmp_path, times, angle[rows])
+        return np.sqrt(np.mean((np.array(summary["step_periods_s"]) - PERIOD_S) ** 2)), " ".join(summary["doubts"])
+
+    every = np.arange(time.size)
+    error, doubts = error_and_doubts(time, every)
+    assert error < 2e-3
+    assert not doubts
+    error, doubts = error_and_doubts(*constant_rate(time, 60.0))
+    assert error > 4e-3
+    assert "Heel strikes are uncertain" in doubts
+    error, doubts = error_and_doubts(every / 60.0, every)
+    assert error > 0.2
+    assert "swing 0.57 times as fast" in doubts
+    error, doubts = error_and_doubts(every * time[-1] / every[-1], every)
+    assert error > 0.2
+    assert not doubts
+
+
 def test_frame_rate_of_a_table_with_one_row_is_refused_with_a_message(tmp_path):
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", [(0.0, 0.1, -0.1)])
     with pytest.raises(ConfigError):
@@ -233,7 +273,7 @@ def test_part_of_a_recording_can_be_read(tmp_path):
     summary = read(tmp_path, time, angle, from_s=1.0, to_s=4.0)
     assert summary["first_heel_strike_s"] == pytest.approx(2.0 * PERIOD_S, abs=1e-4)
     assert summary["steps"] == 3
-    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s; its times go from 0 to 5\.27 s") as refused:
+    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s: its times go from 0 to 5\.27 s") as refused:
         read(tmp_path, time, angle, from_s=9.0)
     assert "--from-s" in refused.value.advice
 
@@ -370,7 +410,7 @@ def test_sports2d_levels_the_floor_and_says_so(walks, sign, tmp_path):
 
 
 @pytest.mark.parametrize("apart_m", [0.0, 0.05])
-def test_legs_that_do_not_meet_at_one_hip_are_doubted(apart_m, tmp_path):
+def test_legs_that_do_not_meet_at_one_hip_raise_a_doubt(apart_m, tmp_path):
     time, angle = sampled()
     hip, *feet = places_of(angle)[:, :, :2].swapaxes(0, 1)
     other = np.c_[apart_m * np.sin(2.0 * np.pi * time), 0.0 * time]

@@ -79,7 +79,7 @@ def test_changed_code_reruns_its_stage_and_dependents(toy):
     }
 
 
-def test_changed_code_of_another_stage_does_not_matter(toy):
+def test_changed_code_of_another_stage_has_no_effect(toy):
     toy.execute("roll")
     toy.edit("bounce", "Compute", "Return")
     assert toy.execute("roll").reused

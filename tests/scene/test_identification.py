@@ -204,7 +204,7 @@ def test_tangents_of_a_limping_walk_equal_difference_quotients(name, first_leg):
 
 
 @pytest.mark.parametrize(("model", "accuracy"), [("rigid", 1e-9), ("contact", 1e-5)])
-def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later(model, accuracy):
+def test_walk_that_begins_with_leg_2_is_the_same_gait_half_a_stride_later(model, accuracy):
     subject, family = limping("prosthesis", model)
     walks = [step_map_of(subject, family, leg) for leg in (1, 2)]
     first, second = (
@@ -219,7 +219,7 @@ def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later(model, accu
 
 @pytest.mark.parametrize("first_leg", [1, 2])
 @pytest.mark.parametrize("name", ["prosthesis", "longer leg"])
-def test_legs_touch_at_the_angles_that_are_sampled_then(name, first_leg):
+def test_touch_angles_equal_the_angles_sampled_at_the_touch(name, first_leg):
     for model, accuracy in (("rigid", 1e-5), ("contact", 5e-4)):
         subject, family = limping(name, model)
         walks, z = step_map_of(subject, family, first_leg), gait_start(subject, family, first_leg)

@@ -62,7 +62,7 @@ states = st.tuples(
 
 
 @given(state=states, radius=st.sampled_from((0.0, 0.001, 0.1)))
-def test_frictionless_ground_is_a_coefficient_of_zero(state, radius):
+def test_frictionless_ground_acts_like_a_coefficient_of_zero(state, radius):
     zero, none = (walker_with(radius, law) for law in (NO_FRICTION, Frictionless()))
     y = over(zero, *state)
     assert rate_of(place_on_ground(none, BOTH), y) == rate_of(place_on_ground(zero, BOTH), y)

@@ -82,7 +82,7 @@ def test_answer_names_the_heavier_leg():
     assert sentences(result) == f"The legs differ: leg 2 is {difference.value:.3f} ± {error:.3f} kg heavier."
 
 
-def test_data_that_do_not_say_which_leg_begins_leave_both_answers():
+def test_data_that_do_not_say_which_leg_begins_give_both_answers():
     result = identify(begun(measured(HEAVIER, "steps"), 1), MASS, "walker.hip_mass_kg")
     assert result.first_leg.by == "guess"
     by_leg = sorted((result.leg_differences[0].value, result.other_differences[0].value))
@@ -102,7 +102,7 @@ def test_walk_of_equal_legs_is_not_called_a_limp():
 
 
 @pytest.mark.parametrize(("heavier", "leg"), [(HEAVIER, 1), (HEAVIER, 2), (-0.8, 1)])
-def test_limp_of_equal_legs_leads_to_the_option_that_explains_it(heavier, leg):
+def test_limp_of_equal_legs_suggests_the_option_that_explains_it(heavier, leg):
     result = identify(begun(measured(heavier, "steps"), leg), "slope_deg")
     assert result.verdict.fit in ("fits-but", "misfit")
     assert any(f"--fit {MASS}" in reason for reason in result.verdict.reasons)

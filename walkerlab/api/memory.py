@@ -10,19 +10,15 @@ import numpy as np
 
 from walkerlab.api.results import Gait, Result, Setting, result_of
 from walkerlab.api.runs import RUNS, check_stage, folder_of, warn
+from walkerlab.config import fields, loader, schema, validation
 from walkerlab.config.contact import Contact
-from walkerlab.config.fields import Block, block_of, kinds_of
 from walkerlab.config.files import DEFAULT, builtin_config, merge_layers, read_layers
-from walkerlab.config.loader import suspicious_values, tree_of
 from walkerlab.config.recording import Recorded
-from walkerlab.config.schema import Config
 from walkerlab.config.tree import NOWHERE
-from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.config.walkers import CompassWalker, Kneed, Walker
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan import graph, results
 from walkerlab.pipeline.plan.resolve import resolve
-from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.files import csv_text
@@ -34,9 +30,9 @@ __all__ = [
     "basin", "check", "compass", "contact", "continue_gait", "design", "explore", "find_gait", "identify", "kneed",
     "plan_measurements", "read_walk", "robustness", "simulate", "walker",
 ]  # fmt: skip
-MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
+MADE_HERE: dict[str, tuple[tuple[type[fields.Block], ...], str]] = {
     "walker": (
-        tuple(kinds_of(Config.model_fields["walker"]).values()),
+        tuple(fields.kinds_of(schema.Config.model_fields["walker"]).values()),
         "walkerlab.compass(), kneed() and walker(type) make one.",
     ),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
@@ -123,7 +119,7 @@ def walker(type: str, **keys: Setting) -> Walker:
     >>> walker("straight-legs", foot_radius_m=0.3).leg_length_m
     0.4
     """
-    return validate_tree(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
+    return validation.validate_tree(loader.tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
 
 
 @shows(CompassKeys)
@@ -169,7 +165,7 @@ def contact(**keys: Unpack[ContactKeys]) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    block = validate_tree(tree_of({"contact": stated_keys(keys)}, NOWHERE)).contact
+    block = validation.validate_tree(loader.tree_of({"contact": stated_keys(keys)}, NOWHERE)).contact
     assert block is not None, "a block set by an argument is in the config"
     return block
 
@@ -344,7 +340,7 @@ def read_walk(
 
 def identify(
     walk: str | Path | Mapping[str, Sequence[float]],
-    config: str | Path | Config = DEFAULT,
+    config: str | Path | schema.Config = DEFAULT,
     fit: Sequence[str] | Mapping[str, Sequence[float] | None] = (),
     prior: Mapping[str, Sequence[float]] | None = None,
     **keys: Setting,
@@ -378,7 +374,7 @@ def identify(
 
 
 def check(
-    config: str | Path | Config = DEFAULT,
+    config: str | Path | schema.Config = DEFAULT,
     printed: Mapping[str, str | float | Sequence[str | float]] | None = None,
     **keys: Setting,
 ) -> Result:
@@ -395,14 +391,14 @@ def check(
     >>> check("simplest", {"state": ["0.20031", "-0.19983"]}, angles={"from": "slope-normal"}).finding
     'reproduced'
     """
-    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    start = config if isinstance(config, schema.Config) else resolve(str(config)).loaded.config
     stated = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
     block = {**stated, **keys, **({} if printed is None else {"printed": dict(printed)})}
     return run_in_memory("check", add_blocks(start, **({"check": block} if block else {})))
 
 
 def plan_measurements(
-    config: str | Path | Config = DEFAULT,
+    config: str | Path | schema.Config = DEFAULT,
     fit: Sequence[str] = (),
     prior: Mapping[str, Sequence[float]] | None = None,
     model: str = "rigid",
@@ -459,21 +455,21 @@ def explore(
     return server
 
 
-def run_in_memory(stage: str, config: Config) -> Result:
+def run_in_memory(stage: str, config: schema.Config) -> Result:
     """Compute a stage and its inputs without files.
 
     Raises ConfigError if the config lacks a block that the stage needs.
     """
     check_stage(stage)
-    PIPELINE[stage].refuse_question(config)
-    memory = MemoryResults()
+    graph.PIPELINE[stage].refuse_question(config)
+    memory = results.MemoryResults()
     answer = answer_in_memory(config, stage, memory)
-    identity = memory.keys.identity(PIPELINE[stage], config, {})
+    identity = memory.keys.identity(graph.PIPELINE[stage], config, {})
     content = Identified(answer.groups, answer.summary, answer.timed, complete=answer.complete, identity=identity)
     return result_of(stage, answer.findings, content, answer.no_answer)
 
 
-def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: Mapping[str, Setting]) -> Config:
+def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: Mapping[str, Setting]) -> schema.Config:
     """Build the paper config with another scene. It has a contact block only if one is passed.
 
     walker  walker block; None keeps the paper's
@@ -490,23 +486,23 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
     # The paper is not the source of another scene, and keys of its walker would be merged into those of another type.
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
-    upper = tree_of(lines, NOWHERE)
+    upper = loader.tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.copy_without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
-    config, moved = align_start(validate_tree(tree), tree)
-    warn([*suspicious_values(config, tree), *moved], inside=1)
+    config, moved = validation.align_start(validation.validate_tree(tree), tree)
+    warn([*loader.suspicious_values(config, tree), *moved], inside=1)
     return config
 
 
-def add_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
+def add_blocks(config: str | Path | schema.Config, **blocks: Setting) -> schema.Config:
     """Return a config with some blocks replaced. `config` may also be a file, a built-in name or a run."""
-    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    start = config if isinstance(config, schema.Config) else resolve(str(config)).loaded.config
     tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}
-    return validate_tree(tree_of(tree, NOWHERE))
+    return validation.validate_tree(loader.tree_of(tree, NOWHERE))
 
 
 def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict[str, Setting]:
     """Remove a stage's keys from `keys`. Return {stage: those keys together with `values`}."""
-    block = block_of(Config.model_fields[stage])
+    block = fields.block_of(schema.Config.model_fields[stage])
     assert block is not None, "a stage with a question has a block"
     block_keys = {name: keys.pop(name) for name in block.model_fields if name in keys}
     entries = {name: value for name, value in {**block_keys, **values}.items() if value is not None}
@@ -514,7 +510,7 @@ def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict
 
 
 def plain(value: Setting) -> Setting:
-    if isinstance(value, Block):
+    if isinstance(value, fields.Block):
         return value.model_dump(mode="json")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 

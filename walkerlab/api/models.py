@@ -3,16 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from walkerlab.api.memory import add_blocks, config_of_scene, plain, run_in_memory
+from walkerlab.api import memory, runs
 from walkerlab.api.results import Gait, Result, Setting
-from walkerlab.api.runs import Run
+from walkerlab.config import files, loader, schema, tree, validation, walkers
 from walkerlab.config.contact import Contact
-from walkerlab.config.files import DEFAULT
-from walkerlab.config.loader import tree_of
-from walkerlab.config.schema import Config
-from walkerlab.config.tree import NOWHERE
-from walkerlab.config.validation import validate_tree
-from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import MemoryResults
@@ -27,7 +21,7 @@ if TYPE_CHECKING:
 
 def export_model(
     path: str | Path,
-    walker: Walker | None = None,
+    walker: walkers.Walker | None = None,
     slope_deg: float | None = None,
     contact: Contact | None = None,
     law: str = "contact",
@@ -61,7 +55,7 @@ def export_model(
             f"{path}: not a model.", f"Choose a file name that ends in one of .{', .'.join(export.ENDINGS)}."
         )
     ground = contact or Contact(terrain="checkerboard")
-    config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
+    config = memory.config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
     texts = _export_texts(config, kind, law, slope, path.stem)
     for name, text in texts.items():
         write_through(path.with_name(name), text.encode())
@@ -69,7 +63,7 @@ def export_model(
 
 
 def mujoco_model(
-    config: str | Path | Config | Run | Gait = DEFAULT, slope: str = "gravity", **blocks: Setting
+    config: str | Path | schema.Config | runs.Run | Gait = files.DEFAULT, slope: str = "gravity", **blocks: Setting
 ) -> "tuple[MjModel, MjData]":
     """Build a walker as a MuJoCo model with data at the start of its gait. Plain `mujoco.mj_step` makes it walk.
 
@@ -100,10 +94,10 @@ def mujoco_model(
     gait = None
     if isinstance(config, Gait):
         gait, config = config, _config_of(config)
-    start = config.config if isinstance(config, Run) else config
-    scene = add_blocks(start, **{name: plain(value) for name, value in blocks.items()})
+    start = config.config if isinstance(config, runs.Run) else config
+    scene = memory.add_blocks(start, **{name: memory.plain(value) for name, value in blocks.items()})
     # If the changed keys change the gait, it has to be found again.
-    if isinstance(start, Config) and _identity_of_gait(start) != _identity_of_gait(scene):
+    if isinstance(start, schema.Config) and _identity_of_gait(start) != _identity_of_gait(scene):
         gait = None
     text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None, gait).values()))
     mujoco.set_mjcb_control(None)
@@ -111,21 +105,23 @@ def mujoco_model(
     return walk.model, walk.data
 
 
-def _config_of(gait: Gait) -> Config:
+def _config_of(gait: Gait) -> schema.Config:
     """Return the config of a gait: of its run or, if it was found in memory, of its walker on the paper's ground."""
     if gait.artifact is not None:
-        return Run(RunFolder.open_folder(gait.artifact.parent)).config
+        return runs.Run(RunFolder.open_folder(gait.artifact.parent)).config
     identity = cast(Identified, gait.content).identity
-    read = {name: value for name, value in identity.config_slice.items() if name in Config.model_fields}
-    return validate_tree(tree_of({"name": "memory", "contact": {"terrain": "checkerboard"}, **read}, NOWHERE))
+    read = {name: value for name, value in identity.config_slice.items() if name in schema.Config.model_fields}
+    return validation.validate_tree(
+        loader.tree_of({"name": "memory", "contact": {"terrain": "checkerboard"}, **read}, tree.NOWHERE)
+    )
 
 
-def _identity_of_gait(config: Config) -> Identity:
+def _identity_of_gait(config: schema.Config) -> Identity:
     return MemoryResults().keys.identity(PIPELINE["fixedpoint"], config, {})
 
 
 def _export_texts(
-    config: Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
+    config: schema.Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
 ) -> dict[str, str]:
     """Return the texts of the files of a model by name. If `gait` is None, the gait is found first."""
     from walkerlab.exchange import export
@@ -135,7 +131,7 @@ def _export_texts(
 
     inputs = {}
     if config.start == "fixed-point":
-        gait = gait or run_in_memory("fixedpoint", config)
+        gait = gait or memory.run_in_memory("fixedpoint", config)
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content

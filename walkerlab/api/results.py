@@ -1,7 +1,5 @@
 """Results of stages in Python: values as attributes, arrays as tables of other libraries, and figures."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import math
@@ -128,7 +126,7 @@ class Result:
         error = self.content.no_answer
         return "" if error is None else error.advice
 
-    def dataset(self, group: str) -> Dataset:
+    def dataset(self, group: str) -> "Dataset":
         """Return a group of arrays as an xarray Dataset with units and long names.
 
         group  one of `groups`
@@ -146,7 +144,7 @@ class Result:
             raise KeyError(f"{self.stage} has no group {name!r}; its groups: {', '.join(self.groups) or 'none'}")
         return self.content[name]
 
-    def to_dataframe(self, group: str = "") -> DataFrame:
+    def to_dataframe(self, group: str = "") -> "DataFrame":
         """Return a group of arrays, by default the first, as a pandas DataFrame. `attrs["units"]` has units by column.
 
         The index is made of the dimensions that all arrays share. Other dimensions give columns such as `angle.1`.
@@ -158,7 +156,7 @@ class Result:
         """
         return dataframe(self._group(group or next(iter(self.groups), "")))
 
-    def plot(self, figure: str = "") -> Figure:
+    def plot(self, figure: str = "") -> "Figure":
         """Draw a figure of this result as a matplotlib Figure, by default the first one of `figures`.
 
         Raises ConfigError for an unknown figure.
@@ -176,7 +174,7 @@ class Result:
         """Names of the figures that show this result alone, as arguments of `plot`."""
         return tuple(self._drawable())
 
-    def _drawable(self) -> dict[str, Illustration]:
+    def _drawable(self) -> "dict[str, Illustration]":
         # Imported here, because it loads matplotlib.
         from walkerlab.views.figures.stage import FIGURES
 
@@ -194,7 +192,7 @@ class Gait(Result):
     (True, ('corrected/gaits', 'as-printed/gaits'))
     """
 
-    def plot(self, figure: str = "") -> Figure:
+    def plot(self, figure: str = "") -> "Figure":
         """Draw the multipliers in the unit circle as a matplotlib Figure.
 
         Raises NoAnswer if there is no gait.
@@ -239,7 +237,7 @@ def result_of(
     return RESULTS.get(stage, Result)(stage, summary, content, message, path)
 
 
-def dataset(group: Group) -> Dataset:
+def dataset(group: Group) -> "Dataset":
     """Convert a group of labelled arrays to an xarray Dataset.
 
     group  such as `result.content["steps"]`; variables named after a dimension become coordinates
@@ -257,7 +255,7 @@ def dataset(group: Group) -> Dataset:
     return result.set_coords(str(group.attrs.get("coordinates", "")).split())
 
 
-def dataframe(group: Group) -> DataFrame:
+def dataframe(group: Group) -> "DataFrame":
     """Convert a group of labelled arrays to a pandas DataFrame.
 
     Raises ConfigError if pandas is not installed.

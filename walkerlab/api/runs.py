@@ -11,17 +11,14 @@ from types import NoneType
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 from walkerlab.api.results import Result, Setting, dataset, result_of, xarray_here
+from walkerlab.config import files, schema
 from walkerlab.config.analyses import Sweep as SweepBlock
-from walkerlab.config.files import DEFAULT
-from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
-from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.plan.planner import result_in
+from walkerlab.pipeline.plan import graph, planner
 from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.run.runner import Options, run_and_write
-from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store import artifact, content
 from walkerlab.pipeline.store.artifact import Damaged
-from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.runs import RunFolder, config_of, run_named
 
 if TYPE_CHECKING:
@@ -61,7 +58,7 @@ class Run:
         return f"Run in {self.folder.path}: {', '.join(names) or 'no results'}"
 
     @property
-    def config(self) -> Config:
+    def config(self) -> schema.Config:
         """Config that the results were computed with.
 
         Raises StaleError if it cannot be determined.
@@ -74,7 +71,7 @@ class Run:
     @property
     def stages(self) -> tuple[str, ...]:
         """Stages with a stored result."""
-        return tuple(name for name in PIPELINE.names if self.folder.artifact(name).is_file())
+        return tuple(name for name in graph.PIPELINE.names if self.folder.artifact(name).is_file())
 
     @property
     def sweeps(self) -> tuple[str, ...]:
@@ -93,7 +90,7 @@ class Run:
         True
         """
         check_stage(stage)
-        stored = result_in(self.folder, stage)
+        stored = planner.result_in(self.folder, stage)
         message = stored.summary.get("no_answer")
         no_answer = None if message is None else NoAnswer(message["message"], message["advice"])
         return result_of(stage, stored.summary, stored, no_answer, self.folder.artifact(stage))
@@ -123,7 +120,7 @@ class Run:
 
 def run(
     stage: str,
-    config: str | Path = DEFAULT,
+    config: str | Path = files.DEFAULT,
     set: Mapping[str, Setting] | None = None,
     runs: str | Path = RUNS,
     *,
@@ -156,7 +153,7 @@ def run(
     resolved = resolve(str(config), set_options(set), strides, folder_of(runs), name)
     warn(resolved.loaded.warnings)
     report = run_and_write(resolved, stage, Options(force=force, jobs=jobs))
-    return result_of(stage, report.as_json(), report.content or Content(), report.no_answer, report.artifact)
+    return result_of(stage, report.as_json(), report.content or content.Content(), report.no_answer, report.artifact)
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
@@ -177,7 +174,7 @@ def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
 def sweep(
     stage: str,
     over: Mapping[str, Sequence[Setting] | str],
-    config: str | Path = DEFAULT,
+    config: str | Path = files.DEFAULT,
     set: Mapping[str, Setting] | None = None,
     runs: str | Path = RUNS,
     *,
@@ -223,7 +220,7 @@ def sweep(
     question = build_sweep(stage, listed, combined.get("zip") or False, combined.get("sample") or "", seed)
     chosen, address = parse_engine(engine)
     engine_options = EngineOptions(
-        jobs, address, modules_of(stage, resolved.loaded.config, PIPELINE), resolved.folder.path
+        jobs, address, modules_of(stage, resolved.loaded.config, graph.PIPELINE), resolved.folder.path
     )
     swept = SweepRun(question, resolved.loaded, resolved.folder).run(SweepWork(chosen, engine_options))
     if swept.failed:
@@ -272,5 +269,5 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
 
 
 def check_stage(stage: str) -> None:
-    if stage not in PIPELINE.names:
-        raise ConfigError(f"{stage}: unknown stage.", f"Choose from {', '.join(PIPELINE.names)}.")
+    if stage not in graph.PIPELINE.names:
+        raise ConfigError(f"{stage}: unknown stage.", f"Choose from {', '.join(graph.PIPELINE.names)}.")

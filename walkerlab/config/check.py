@@ -1,7 +1,5 @@
 """The check block: a gait as printed, with its digits and its conventions."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal

@@ -13,15 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from walkerlab.config import files
-from walkerlab.config.analyses import Case
+from walkerlab.config import analyses, files, schema, walkers
 from walkerlab.config.fields import block_of, short_number
 from walkerlab.config.problems import Problem, problem_error
 from walkerlab.config.reads import flatten
-from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar
 from walkerlab.config.validation import Location, align_start, key_at, node_at, validate_tree
-from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
 IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
@@ -38,7 +35,7 @@ WATER_KG_M3: Final = 1000.0
 class LoadedConfig:
     """A valid config with its origin."""
 
-    config: Config  # typed config, complete with defaults
+    config: schema.Config  # typed config, complete with defaults
     run_name: str  # name of the run's folder inside the runs folder
     # KEY=VALUE of each key that differs from the config's file; earlier changes of a stored run come first
     changes: tuple[str, ...]
@@ -48,7 +45,7 @@ class LoadedConfig:
     base_tree: BlockNode  # the same without settings
 
     @property
-    def base(self) -> Config:
+    def base(self) -> schema.Config:
         """The config without the changes by `--set` and `--strides`."""
         return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
@@ -57,7 +54,7 @@ class LoadedConfig:
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
-    def variant(self, settings: Sequence[files.ConfigSetting]) -> Config:
+    def variant(self, settings: Sequence[files.ConfigSetting]) -> schema.Config:
         """Return the config with some keys changed.
 
         Raises ConfigError with positions if it is invalid.
@@ -126,14 +123,14 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
-def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
+def suspicious_values(config: schema.Config, tree: BlockNode) -> Iterator[str]:
     """Yield warnings about likely mistakes: wrong units, a pad pitch without pads, a leg mass left in place as the leg
     grew."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
     length = short_number(walker.leg_length_m)
-    if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
+    if isinstance(walker, walkers.CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg = places["leg_length_m"]
         mass = places["foot_to_mass_m"].source
         stays = walker.foot_to_mass_m
@@ -178,13 +175,13 @@ MAX_NAME: Final = 40
 UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
-def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
+def changes_of(base: schema.Config, changed: schema.Config, slope_deg: float | None = None) -> tuple[str, ...]:
     """List the keys in which `changed` differs from `base` as KEY=VALUE. If slope_deg is given, it stands for
     slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
-        block = block_of(Config.model_fields[name])
+        block = block_of(schema.Config.model_fields[name])
         if block is not None and before[name] is None and after[name] is not None:
             before[name] = block().model_dump(mode="json")
             added.append(f"{name}=added")
@@ -207,7 +204,7 @@ def run_name(name: str, changes: Sequence[str]) -> str:
     if not change or (len(full_name) <= MAX_NAME and not UNSAFE.search(change)):
         return full_name
     keys = [key_of(change_text) for change_text in changes]
-    label = next((key.partition(".")[0] for key in keys if key.partition(".")[0] in QUESTIONS), keys[0])
+    label = next((key.partition(".")[0] for key in keys if key.partition(".")[0] in schema.QUESTIONS), keys[0])
     return f"{name}@{UNSAFE.sub('-', label)}-{hashlib.sha256(change.encode()).hexdigest()[:8]}"
 
 
@@ -223,7 +220,7 @@ def _word(value: Any) -> str:
     return "none" if value is None else str(value)
 
 
-def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> Config:
+def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> schema.Config:
     """Build the paper config with changes. `lines` has nested keys with values, and `source` is how messages name them.
 
     Values of a start that follow from others are computed without a warning. Raises ConfigError if the result is
@@ -232,7 +229,7 @@ def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> 
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
 
-def paper_config_with_tree(upper: BlockNode) -> Config:
+def paper_config_with_tree(upper: BlockNode) -> schema.Config:
     """Build the paper config with the keys of a block changed.
 
     Raises ConfigError with positions if the result is invalid.
@@ -248,7 +245,7 @@ def paper_config_with_tree(upper: BlockNode) -> Config:
     return align_start(validate_tree(tree), tree)[0]
 
 
-def check_cases(config: Config, tree: BlockNode) -> None:
+def check_cases(config: schema.Config, tree: BlockNode) -> None:
     """Raise ConfigError with positions if a config's stability cases are invalid or share a name."""
     if not config.stability.cases:
         return
@@ -268,7 +265,7 @@ def check_cases(config: Config, tree: BlockNode) -> None:
             check_ground(case, over, lines)
 
 
-def check_ground(case: Case, config: Config, lines: BlockNode) -> None:
+def check_ground(case: analyses.Case, config: schema.Config, lines: BlockNode) -> None:
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise problem_error(where, f"contact: case {case.name} needs a contact block but has none", "model: rigid")

@@ -10,9 +10,7 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import annotation_of, bounds_of, describe_type, leaves, leaves_of_other_kinds, short_number
-from walkerlab.config.files import builtin_names
-from walkerlab.config.problems import nearest
+from walkerlab.config import fields, files, problems
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
@@ -40,7 +38,7 @@ class KeyReference:
 
 def keys() -> Iterator[KeyReference]:
     """Yield every key of a config file, in the schema's order."""
-    builtins = ", ".join(builtin_names())
+    builtins = ", ".join(files.builtin_names())
     yield KeyReference(
         key="extends",
         type="text",
@@ -50,11 +48,11 @@ def keys() -> Iterator[KeyReference]:
         meaning=EXTENDS_MEANING,
         source="this project",
     )
-    for path, field in leaves(Config):
+    for path, field in fields.leaves(Config):
         yield _reference(path, field)
         if path == ("slope_rad",):
             yield _reference(("slope_deg",), SlopeInDegrees.model_fields["slope_deg"])
-    for path, field in leaves_of_other_kinds(Config):
+    for path, field in fields.leaves_of_other_kinds(Config):
         yield _reference(path, field)
 
 
@@ -62,12 +60,12 @@ def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
     default = field.get_default(call_default_factory=True, validated_data={})
     return KeyReference(
         key=".".join(path),
-        type=describe_type(field.annotation),
-        unit=annotation_of(field, "unit"),
-        bounds=bounds_of(field),
-        default=annotation_of(field, "default_in_words") or _format_default(default),
+        type=fields.describe_type(field.annotation),
+        unit=fields.annotation_of(field, "unit"),
+        bounds=fields.bounds_of(field),
+        default=fields.annotation_of(field, "default_in_words") or _format_default(default),
         meaning=field.description or "",
-        source=annotation_of(field, "source"),
+        source=fields.annotation_of(field, "source"),
     )
 
 
@@ -76,7 +74,7 @@ def _format_default(value: Any) -> str:
         return "none"
     if isinstance(value, tuple):
         return f"[{', '.join(_format_default(item) for item in value)}]"
-    return short_number(value) if isinstance(value, int | float) else str(value)
+    return fields.short_number(value) if isinstance(value, int | float) else str(value)
 
 
 def as_paragraphs(selection: str = "") -> str:
@@ -110,7 +108,7 @@ def select_keys(selection: str) -> list[KeyReference]:
         names = dict.fromkeys(".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3))
         similar = " or ".join([name for name in names if selection in name.split(".")[-1]][:SHOWN_KEYS])
         by_end = {name.split(".")[-1]: name for name in reversed(names)}
-        near = similar or nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
+        near = similar or problems.nearest(selection, names) or by_end.get(problems.nearest(selection, by_end), "")
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {selection}.{meant}", "`walkerlab schema` lists every key")
     everywhere = {key for key in matches if key.key == plain[key]}
@@ -124,7 +122,7 @@ def as_json_schema(selection: str = "") -> dict[str, Any]:
     """
     schema = Config.model_json_schema()
     degrees = SlopeInDegrees.model_json_schema()["properties"]["slope_deg"]
-    extends = {"type": "string", "description": EXTENDS_MEANING, "examples": list(builtin_names())}
+    extends = {"type": "string", "description": EXTENDS_MEANING, "examples": list(files.builtin_names())}
     schema["properties"] = {"extends": extends, **schema["properties"], "slope_deg": degrees}
     schema["not"] = {"required": ["slope_rad", "slope_deg"]}
     part = schema if not selection else part_of(schema, selection)

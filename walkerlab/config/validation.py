@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from walkerlab.config import fields
+from walkerlab.config import fields, schema, walkers
 from walkerlab.config.contact import BOUNDS_SI
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, merge_layers, read_layers
 from walkerlab.config.problems import (
@@ -20,9 +20,7 @@ from walkerlab.config.problems import (
     problem_error,
     problems_error,
 )
-from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
-from walkerlab.config.walkers import AssembledWalker, Kneed, followers
 from walkerlab.extensions import WORDS, external_extensions
 
 Location: TypeAlias = tuple[int | str, ...]
@@ -67,7 +65,7 @@ DIGITS_COUNT: Final = ("printed", "state_before")
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
-def validate_tree(tree: BlockNode) -> Config:
+def validate_tree(tree: BlockNode) -> schema.Config:
     """Convert a tree to a typed config. Raises ConfigError with every problem found."""
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
@@ -78,13 +76,13 @@ def validate_tree(tree: BlockNode) -> Config:
     if "slope_deg" in data:
         degrees = data.pop("slope_deg")
         try:
-            data["slope_rad"] = math.radians(SlopeInDegrees(slope_deg=degrees).slope_deg)
+            data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=degrees).slope_deg)
         except ValidationError as error:
-            problems += _problems(error, tree, SlopeInDegrees)
+            problems += _problems(error, tree, schema.SlopeInDegrees)
     try:
-        config = Config.model_validate(data)
+        config = schema.Config.model_validate(data)
     except ValidationError as error:
-        problems += _problems(error, tree, Config)
+        problems += _problems(error, tree, schema.Config)
     if problems:
         raise problems_error(sorted(problems, key=_place))
     check_bodies(config, tree)
@@ -100,14 +98,14 @@ class FollowingValue(NamedTuple):
     because: str
 
 
-def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...]]:
+def align_start(config: schema.Config, tree: BlockNode) -> tuple[schema.Config, tuple[str, ...]]:
     """Compute the values of the start that follow from others, and describe how much stated values had to be changed.
 
     Raises ConfigError with a position for a missing value that does not follow, or a stated value that is far off.
     """
     if isinstance(config.start, str):
         return config, ()
-    stated: Sequence[float | None] = config.start.state if isinstance(config.start, MidStep) else config.start
+    stated: Sequence[float | None] = config.start.state if isinstance(config.start, schema.MidStep) else config.start
     where = tree.entries["start"].position
     start = list(stated)
     adjustments = list[str]()
@@ -128,15 +126,15 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
             raise problem_error(where, change.format("is", "but must be"), advice=advice)
         adjustments.append(str(Problem(where, change.format("moved from", "to"))))
-    if not isinstance(config.start, MidStep):
+    if not isinstance(config.start, schema.MidStep):
         return config.model_copy(update={"start": tuple(start)}), tuple(adjustments)
-    if isinstance(config.walker, Kneed) and config.start.state[2] > config.start.state[0] + MOVED_RAD:
+    if isinstance(config.walker, walkers.Kneed) and config.start.state[2] > config.start.state[0] + MOVED_RAD:
         raise problem_error(where, "start: theta_1_shank is above theta_1, but knees do not bend beyond straight")
     midway_start = config.start.model_copy(update={"state": tuple(start)})
     return config.model_copy(update={"start": midway_start}), tuple(adjustments)
 
 
-def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
+def following_values(config: schema.Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
     """Return the values of a start that can be computed from others, by index.
 
     Just after a heel strike, both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
@@ -147,17 +145,17 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     bodies = len(stated) // 2
     values = [0.0 if value is None else value for value in stated]
     following = dict[int, FollowingValue]()
-    if not isinstance(config.start, MidStep) and not isinstance(walker, AssembledWalker):
+    if not isinstance(config.start, schema.MidStep) and not isinstance(walker, walkers.AssembledWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
         if walker.second is not walker:
             swing = walker.swing_angle(values[1] + config.slope_rad)
             values[0] = values[0] if swing is None else swing - config.slope_rad
         following[0] = FollowingValue("theta_1", values[0], "rad", because)
-        if isinstance(walker, Kneed):
+        if isinstance(walker, walkers.Kneed):
             values[2] = values[0]
             following[2] = FollowingValue("theta_1_shank", values[0], "rad", "so that the leg is straight")
-    for place, (name, of) in followers(walker).items():
+    for place, (name, of) in walkers.followers(walker).items():
         for first, theta, unit in ((0, "theta", "rad"), (bodies, "dtheta", "rad/s")):
             value = sum(weight * values[first + body] for body, weight in of.items())
             because = f"because the {name} follows other bodies"
@@ -165,10 +163,10 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     return following
 
 
-def check_bodies(config: Config, tree: BlockNode) -> None:
+def check_bodies(config: schema.Config, tree: BlockNode) -> None:
     """Raise ConfigError with positions for parts on unknown bodies or feet on the wrong leg."""
     walker = config.walker
-    if not isinstance(walker, AssembledWalker):
+    if not isinstance(walker, walkers.AssembledWalker):
         return
     bodies = [body.name for body in walker.bodies]
     problems = []
@@ -188,7 +186,7 @@ def check_bodies(config: Config, tree: BlockNode) -> None:
         raise problems_error(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
 
 
-def body_references(walker: AssembledWalker) -> Iterator[tuple[Location, str]]:
+def body_references(walker: walkers.AssembledWalker) -> Iterator[tuple[Location, str]]:
     for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
             yield from (((key, k, name), getattr(part, name)) for name in names)
@@ -220,7 +218,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
         allowed = f"one of {', '.join(kinds)}{advise_extensions()}"
         return Problem(position, text, allowed, "" if beyond else nearest(word, kinds))
     # Pydantic inserts the kind of value that it tried into the location, although the config has no such key.
-    if len(location) > 1 and location[1] in (*kinds, MID_STEP):
+    if len(location) > 1 and location[1] in (*kinds, schema.MID_STEP):
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
         return _unknown_key(location, tree)
@@ -285,9 +283,9 @@ def _locate_key(
 
 
 def _unknown_key(location: Location, tree: BlockNode) -> Problem:
-    above, field, inner = _locate_key(Config, location[:-1], tree)
+    above, field, inner = _locate_key(schema.Config, location[:-1], tree)
     name = str(location[-1])
-    block = inner or Config
+    block = inner or schema.Config
     kinds = {} if field is None else fields.kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
     assert isinstance(parent, BlockNode), "the parent holds the key"
@@ -296,7 +294,7 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     if location == ("extends",):
         allowed = "put `extends` in a file and pass it with -c"
         return Problem(parent.keys[name], "extends: belongs in a file, not in --set", allowed)
-    siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
+    siblings = [*block.model_fields, *(("slope_deg", "extends") if block is schema.Config else ())]
     text = f"{printable('.'.join((*above, name)))}: unknown key ({format_node(parent.entries[name])})"
     value = parent.entries[name]
     beyond = explain_missing_feature(name) or (
@@ -334,7 +332,7 @@ def _keys_of_another_kind(
 
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
     """Return the path of the key, in any block, whose name is nearest (if `exactly`, equal) to `name`, or ''."""
-    paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(Config)))}
+    paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(schema.Config)))}
     # A dotted name is compared with whole paths.
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")

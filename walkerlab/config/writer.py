@@ -9,9 +9,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, block_of, describe_allowed
-from walkerlab.config.reader import value_of
-from walkerlab.config.schema import Config, Source
+from walkerlab.config import fields, reader, schema
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
 """Pattern of YAML values that need quotes."""
@@ -19,11 +17,11 @@ LINE_WIDTH: Final = 110
 ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
 
-def to_yaml(config: Config) -> str:
+def to_yaml(config: schema.Config) -> str:
     return "".join(f"{line}\n" for line in _lines(config.model_dump(mode="json"), ""))
 
 
-def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> str:
+def to_extending_yaml(start: str, base: schema.Config, changed: schema.Config, name: str) -> str:
     """Write only the keys that differ from `base` as YAML that extends `base` by the name `start`."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
@@ -53,32 +51,32 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
     return different
 
 
-def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
+def to_commented_yaml(config: schema.Config, left_alone: Collection[str] = ()) -> str:
     """Write a config, without the keys `left_alone`, as YAML with meaning, bounds and unit above each key."""
     kept = [name for name in type(config).model_fields if name not in left_alone]
     return commented_keys(config, kept) + "".join(f"# {name}: {ELSEWHERE.format(name)}\n" for name in left_alone)
 
 
-def commented_keys(config: Config, names: Collection[str]) -> str:
+def commented_keys(config: schema.Config, names: Collection[str]) -> str:
     """Write only some top-level keys of a config, as `to_commented_yaml` does."""
     values = config.model_dump(mode="json", include=set(names))
     return "".join(f"{line}\n" for line in _commented(config, values, ""))
 
 
-def _commented(block: Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:
+def _commented(block: fields.Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:
     for name, value in values.items():
         field = type(block).model_fields[name]
         content = getattr(block, name)
-        if isinstance(content, Block):
+        if isinstance(content, fields.Block):
             yield from [""] * (not indent)
             yield from _comment(field.description or "", indent)
             yield f"{indent}{name}:"
             yield from _commented(content, value, f"{indent}  ", f"{path}{name}.")
-        elif value is None and block_of(field) is Source:
+        elif value is None and fields.block_of(field) is schema.Source:
             continue  # an absent `source` is omitted, because only a config that reproduces a study has one
-        elif value is None and block_of(field) is not None:
+        elif value is None and fields.block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
-        elif isinstance(content, tuple) and (listed := block_of(field)) is not None:
+        elif isinstance(content, tuple) and (listed := fields.block_of(field)) is not None:
             yield from _comment(field.description or "", indent)
             for inner, inner_field in listed.model_fields.items():
                 yield from _comment(f"{inner}: {_meaning(inner_field)}", f"{indent}  ")
@@ -91,7 +89,7 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
 
 
 def _meaning(field: FieldInfo) -> str:
-    return ": ".join(part for part in (field.description, describe_allowed(field)) if part)
+    return ": ".join(part for part in (field.description, fields.describe_allowed(field)) if part)
 
 
 def _comment(text: str, indent: str) -> Iterator[str]:
@@ -116,7 +114,7 @@ def _value(value: Any) -> str:
         return f"[{', '.join(_value(item) for item in value)}]"
     if isinstance(value, float):
         return _number(value)
-    if isinstance(value, str) and value_of(value) == value and not PUNCTUATION.search(value):
+    if isinstance(value, str) and reader.value_of(value) == value and not PUNCTUATION.search(value):
         return value
     return json.dumps(value)
 

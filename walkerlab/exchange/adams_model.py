@@ -120,7 +120,9 @@ class Torque:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Condition that ends a simulation: an expression reaches zero from below. `halts` stops the whole run."""
+    """Condition that ends a simulation: an expression reaches zero from below. If `halts` is true, it stops the whole
+    run.
+    """
 
     function: str
     error: float

@@ -89,7 +89,9 @@ class RecordedWalk:
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then shifted."""
+    """Source of a quantity: a column, or a line between markers. Values are multiplied by `sign`, then `constant` is
+    added.
+    """
 
     column: str
     sign: float = 1.0
@@ -209,7 +211,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
 def remove_unlikely_positions(
     recording: Recording, lines: Sequence[str], least: float | None
 ) -> tuple[Recording, list[str]]:
-    """Turn positions of the markers of `lines` with a likelihood below `least` into gaps. Also return notes.
+    """Mark positions of the markers of `lines` as gaps if their likelihood is below `least`. Also return notes.
 
     Raises ConfigError if the file has no likelihoods although the user gives a limit.
     """
@@ -224,7 +226,7 @@ def remove_unlikely_positions(
         low = {marker: each for marker, each in likelihoods.items() if np.any(each < DOUBTFUL_LIKELIHOOD)}
         spelled = ", ".join(f"{marker} at {spell_rows(each < DOUBTFUL_LIKELIHOOD)}" for marker, each in low.items())
         return recording, [
-            f"Likelihoods are below {DOUBTFUL_LIKELIHOOD:g}: {spelled}; --min-likelihood makes such places gaps."
+            f"Likelihoods are below {DOUBTFUL_LIKELIHOOD:g}: {spelled}. --min-likelihood turns them into gaps."
         ] if low else []
     if not likelihoods:
         raise ConfigError(
@@ -241,7 +243,7 @@ def remove_unlikely_positions(
 
 
 def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Turn angles that stand still for some samples and then leap into gaps.
+    """Mark angles as gaps where they stand still for some samples and then leap.
 
     Software that fills gaps produces such angles.
     """
@@ -331,7 +333,7 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
-            f"{recording.path} has no sample from {begin:g} to {end:g} s; its times go from {np.min(time):g} to "
+            f"{recording.path} has no sample from {begin:g} to {end:g} s: its times go from {np.min(time):g} to "
             f"{np.max(time):g} s.",
             "Change --from-s and --to-s.",
         )
@@ -392,7 +394,7 @@ def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | sli
 def refuse_order(path: Path, time: Array) -> None:
     """Raise ConfigError unless there are at least two times and they rise strictly."""
     if time.size < 2:
-        raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
+        raise ConfigError(f"{path} has {time.size} samples, but a walk needs at least two.", "Record a longer walk.")
     steps_back = np.flatnonzero(np.diff(time) <= 0.0)
     if steps_back.size:
         row = int(steps_back[0])
@@ -479,7 +481,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     if unit is None:
         raise ConfigError(
             f"--columns: {text!r} adds a constant in {match[4]!r}, which is not a unit of {kind}.",
-            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; quote a name that ends like this: '\"{text}\"'.",
+            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}. Quote a name that ends like this: '\"{text}\"'.",
         )
     column = named_column(recording, match[2].strip())
     if match[1] and LINE.fullmatch(column) and column not in recording.columns:
@@ -546,7 +548,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
         return ConfigError(
-            f"{recording.path} has no time column; the first columns are {there}.",
+            f"{recording.path} has no time column. Its first columns are {there}.",
             'Name it: --columns "time=NAME". For a file that counts frames, state their rate: --fps RATE.',
         )
     markers = [column.removesuffix(".x") for column in recording.columns if column.endswith(".x")]
@@ -558,7 +560,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
     near = get_close_matches(normalise_name(name), [normalise_name(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and normalise_name(column) == near[0]), "NAME")
     return ConfigError(
-        f"{recording.path} has no column for {name!r}; it has: {there}.", f'Name it: --columns "{name}={nearest}"'
+        f"{recording.path} has no column for {name!r}. It has: {there}.", f'Name it: --columns "{name}={nearest}"'
     )
 
 
@@ -614,7 +616,7 @@ def stated_unit(recording: Recording, name: str, source: str, kind: str, units: 
 def unknown_unit_error(recording: Recording, unit: str, name: str, kind: str) -> ConfigError:
     return ConfigError(
         f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
-        f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
+        f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}. Set --units {kind}={SI[kind]}.",
     )
 
 

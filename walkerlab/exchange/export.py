@@ -1,19 +1,14 @@
 """Export a walker with the start of its gait to ADAMS and MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeVar, get_args
 
 from walkerlab.config.walkers import Kneed
 from walkerlab.errors import ConfigError
-from walkerlab.exchange import mjcf
-from walkerlab.exchange.adams import command_text, dataset_text, view_text
+from walkerlab.exchange import adams, exported, mjcf, planar
 from walkerlab.exchange.adams_model import adams_model
-from walkerlab.exchange.exported import Exported, GaitStart, prepare_export
 from walkerlab.exchange.mjcf import Slope
-from walkerlab.exchange.planar import SMALLEST_BALL_M
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -36,8 +31,8 @@ class ExportedFiles:
 
 
 def export_model(
-    config: Config,
-    start: GaitStart,
+    config: "Config",
+    start: exported.GaitStart,
     kind: Kind,
     law: Law = "contact",
     commit: str | None = None,
@@ -57,7 +52,7 @@ def export_model(
     """
     # With MuJoCo, the exported script simulates the plastic impact, so no stop is needed.
     locked = config if kind == "mjcf" else add_stops(config)
-    export = prepare_export(locked, start)
+    export = exported.prepare_export(locked, start)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
     tilted = "gravity" if slope == "gravity" else "ground"
@@ -72,10 +67,10 @@ def export_model(
     model = adams_model(export, law)
     pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
     if kind == "cmd":
-        return ExportedFiles({f"{stem}.cmd": view_text(model, head, export.end_s, pinned_until_s)}, left_out)
+        return ExportedFiles({f"{stem}.cmd": adams.view_text(model, head, export.end_s, pinned_until_s)}, left_out)
     dataset = f"{stem}.adm"
-    commands = command_text(model, dataset, export.end_s, pinned_until_s)
-    files = {dataset: dataset_text(model, head), f"{stem}.acf": commands}
+    commands = adams.command_text(model, dataset, export.end_s, pinned_until_s)
+    files = {dataset: adams.dataset_text(model, head), f"{stem}.acf": commands}
     return ExportedFiles(files, left_out)
 
 
@@ -91,16 +86,16 @@ def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Ch
 
 
 def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names, as `choose` does."""
+    """Return the ADAMS contact law that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, CONTACT_LAWS, "--law", "contact law")
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way of expressing a slope that `text` names, as `choose` does."""
+    """Return the way to express a slope that `text` names. Raises the error of `choose` for an unknown name."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 
-def add_stops(config: Config) -> Config:
+def add_stops(config: "Config") -> "Config":
     """Return a config in which a stop brings each knee to rest before it locks.
 
     When a joint is activated, ADAMS changes velocities by other rules than ours. If the knee is at rest, they have no
@@ -113,13 +108,13 @@ def add_stops(config: Config) -> Config:
     return config.model_copy(update={"walker": stopped})
 
 
-def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, script: str) -> Iterator[str]:
+def parts_left_out(export: exported.Exported, config: "Config", kind: Kind, law: Law, script: str) -> Iterator[str]:
     """Describe the parts of the walk of a config that an exported model lacks or replaces."""
     by_functions = kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:
         yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"
     if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
-        millimetres = 1e3 * SMALLEST_BALL_M
+        millimetres = 1e3 * planar.SMALLEST_BALL_M
         yield f"point feet, replaced by balls of {millimetres:g} mm on ground lower by the same amount"
     if kind == "mjcf":
         if parts := mjcf.parts_of_script(export):
@@ -128,7 +123,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
         # The configs differ only if `add_stops` has replaced an ideal lock.
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
-        when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
+        when = "act at the touch times of walkerlab's walk, because ADAMS functions have no memory"
         if any(export.impulses_N_s):
             yield f"the trigger of push-offs; open-loop pulses {when}"
         if export.hip.torque_N_m:

@@ -1,7 +1,5 @@
 """Walker to export, on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator
@@ -12,16 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import walkerlab
-from walkerlab.config.drives import LINEAR, Hip, push_offs
-from walkerlab.config.walkers import contact_required_error
+from walkerlab.config import drives, walkers
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
-from walkerlab.exchange.planar import PlanarModel, coupling_rows
+from walkerlab.exchange import engine_scene, planar
 from walkerlab.physics.ground.terrain import STANCE_FOOT, foothold_height
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.contact import scene_on_pads, tolerances_of
-from walkerlab.scene.rigid import foothold_heights
+from walkerlab.scene import contact, rigid
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -59,15 +54,15 @@ class GaitStart(NamedTuple):
 class Exported:
     """Walker on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
-    config: Config
-    scene: EngineScene  # walker and ground in the form that other programs need
+    config: "Config"
+    scene: engine_scene.EngineScene  # walker and ground in the form that other programs need
     steps: int  # maximum number of steps of the walk
     walk: ContactWalkResult  # walk of the contact model from that start
     heights: Floats | None  # (footholds,) heights of uneven ground (m); None on even ground
     pinned: bool  # whether a revolute joint holds the stance foot until the first touchdown
 
     @property
-    def model(self) -> PlanarModel:
+    def model(self) -> planar.PlanarModel:
         return self.scene.model
 
     @cached_property
@@ -89,15 +84,15 @@ class Exported:
     @property
     def impulses_N_s(self) -> tuple[float, float]:
         """Impulse of the push-off of each leg."""
-        return push_offs(self.config.push_off)
+        return drives.push_offs(self.config.push_off)
 
     @property
-    def hip(self) -> Hip:
+    def hip(self) -> drives.Hip:
         return self.config.walker.hip
 
     @property
     def hip_link(self) -> int:
-        """Index of the link that hangs from the base's hip: the leg that swings first."""
+        """Index of the link that is hinged to the base at the hip. It belongs to the leg that swings first."""
         upper = self.scene.assembly.legs[1 - STANCE_FOOT][0]
         return [link.name for link in self.model.links].index(upper)
 
@@ -109,9 +104,11 @@ class Exported:
 
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
-        """Weights of hinge angles, by link, for each body that follows others. Each weighted sum is zero."""
+        """Weights of hinge angles, by link, for each body that follows others. The weighted sum of its hinge angles is
+        zero.
+        """
         weights = []
-        for row in coupling_rows(self.scene.assembly, self.model):
+        for row in planar.coupling_rows(self.scene.assembly, self.model):
             # Relative angles suffice only if the weights add up to 1, because then the angle of the base drops out.
             if abs(row[0]) > MIN_WEIGHT:
                 raise ConfigError(
@@ -189,30 +186,30 @@ def identifier(name: str) -> str:
     return plain if plain[:1].isalpha() else f"m_{plain}"
 
 
-def prepare_export(config: Config, start: GaitStart) -> Exported:
+def prepare_export(config: "Config", start: GaitStart) -> Exported:
     """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid start.
 
     Raises ConfigError for a walker or a ground that cannot be exported.
     """
     refuse(config)
-    contact_scene = scene_on_pads(config, start.step_length_m, start.state, asymmetry=start.asymmetry)
+    contact_scene = contact.scene_on_pads(config, start.step_length_m, start.state, asymmetry=start.asymmetry)
     steps = 2 * config.strides
-    scene = scene_for_engines(contact_scene, start.state)
-    heights = foothold_heights(config.ground, steps + 1)
-    walk = contact_scene.walk(scene.start, steps, tolerances_of(config, steps), None, heights)
+    scene = engine_scene.scene_for_engines(contact_scene, start.state)
+    heights = rigid.foothold_heights(config.ground, steps + 1)
+    walk = contact_scene.walk(scene.start, steps, contact.tolerances_of(config, steps), None, heights)
     return Exported(config, scene, steps, walk, heights, contact_scene.pinned)
 
 
-def refuse(config: Config) -> None:
+def refuse(config: "Config") -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
     if config.contact is None:
-        raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
+        raise walkers.contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
     if config.contact.terrain == "after-mid-swing":
         raise ConfigError(
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
             "Set contact.terrain=checkerboard.",
         )
-    if config.walker.hip.hinge_law != LINEAR:
+    if config.walker.hip.hinge_law != drives.LINEAR:
         raise ConfigError(
             f"The hinge law {config.walker.hip.hinge_law} cannot be exported.", "Set walker.hip.hinge_law=linear."
         )

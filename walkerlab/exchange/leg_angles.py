@@ -1,4 +1,4 @@
-"""Repairs of recorded leg angles before the search for heel strikes.
+"""Repairs that recorded leg angles need before the search for heel strikes.
 
 They unwrap full turns, exchange swapped legs, drop outliers, correct signs, and keep one direction of walking.
 
@@ -31,34 +31,37 @@ from walkerlab.exchange.touches import (
     typical_interval,
 )
 
-UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg's angle from the vertical
-MIN_PASSING_SAMPLES: Final = 3  # a passing of the legs takes at least this many sample intervals
+UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg angle from the vertical
+MIN_PASSING_SAMPLES: Final = 3  # minimum number of sample intervals in which the legs pass each other
 NOISY_RATIO: Final = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
-MIN_VARIANCE: Final = 1e-30  # rad^2, added to a variance that may be zero
-HIGHEST_DEGREE: Final = 7  # of the polynomial through a step, whose error is then 0.1 mrad for straight legs
+MIN_VARIANCE: Final = 1e-30  # rad^2; added to variances, because they may be zero
+# highest degree of the polynomial through a step; with it, the error is 0.1 mrad for straight legs
+HIGHEST_DEGREE: Final = 7
 SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
-FAR_PERCENT: Final = 80  # legs count as far apart above this percentile of the angle between them
-SEARCH_RANGE: Final = 0.3  # strikes are searched for this long before and after a first guess, as a fraction of a step
+FAR_PERCENT: Final = 80  # legs are far apart if the angle between them is above this percentile
+# time before and after a first guess in which a strike is searched for, as a fraction of a step
+SEARCH_RANGE: Final = 0.3
 MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-MAX_STRETCH: Final = 0.3  # longer stretches off the course are lasting jumps, as a fraction of a step
-BORDER: Final = 0.1  # fraction of a step at the far end of a fit that is left to other fits
-LASTING_BORDER: Final = 0.15  # as `BORDER`, for lasting jumps
-LENGTH_TRIALS: Final = 16  # number of lengths of a stretch that are tried first
+MAX_STRETCH: Final = 0.3  # stretches off the course that are longer than this fraction of a step are lasting jumps
+BORDER: Final = 0.1  # fraction of a step at either end of a fit that other fits cover
+LASTING_BORDER: Final = 0.15  # the same for lasting jumps
+LENGTH_TRIALS: Final = 16  # number of lengths that are tried first for a stretch
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
-NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
+NEXT_TRIALS: Final = (9,)  # numbers of instants that are then tried around the best one
 STANDARD_ERRORS: Final = 7.0
 MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
 TYPICAL_PERCENT: Final = 30
 MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
 MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
 MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
-JOINT_SEARCH_FRACTION: Final = 0.5  # above this fraction of the limit, stretch and strike are searched for together
+# A stretch that explains more than this fraction of the limit is searched for together with the strike.
+JOINT_SEARCH_FRACTION: Final = 0.5
 MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
-MAX_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-MIN_NORM: Final = 0.12  # smallest squared part of a stretch, in samples, that polynomials must not follow
+MAX_STRETCHES: Final = 30  # maximum number of stretches in the steps around a strike
+MIN_NORM: Final = 0.12  # minimum squared part of a stretch, in samples, that polynomials cannot follow
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
-    # Full turns, reversed signs and swapped legs would look like samples off the course, so they are mended first.
+    # Full turns, reversed signs and swapped legs would look like samples off the course, so repair them first.
     mended = drop_off_course(swap_back(keep_one_way(unwrap(walk, source))))
     upright = {name: mended.quantities[name] - walk.tilt_rad for name in ("angle 1", "angle 2")}
     return replace(mended, quantities={**mended.quantities, **upright})
@@ -94,7 +97,7 @@ def add_doubt(walk: RecordedWalk, doubt: str) -> RecordedWalk:
 
 
 def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Undo jumps by full turns. Subtract half a turn from angles that are measured from the upward vertical.
+    """Remove jumps by full turns. Angles from the upward vertical are turned by half a turn.
 
     Raises ConfigError for angles in another unit, and for a leg that is not near the vertical.
     """
@@ -124,7 +127,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
 
 
 def swap_back(walk: RecordedWalk) -> RecordedWalk:
-    """Swap the legs back where their angles are exchanged from one sample to the next."""
+    """Swap the legs back where their angles have been exchanged."""
     angle = read_leg_angles(walk)
     swapped = swapped_rows(walk.time_s, angle[:, :1] - angle[:, 1:])
     if not swapped.any():
@@ -194,7 +197,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     begin = [0, *turns][longest]
     end = [*turns, walk.time_s.size - 1][longest]
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
-    kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
+    kept = f"the longest stretch in one direction, from {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
     return select_rows(
         add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
@@ -202,7 +205,9 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
 
 
 def find_ways(time: Array, angle: Array) -> list[Way]:
-    """Divide a walk into stretches in one direction. A single passing of the legs the other way does not count."""
+    """Divide a walk into stretches in one direction. If the legs pass each other the other way only once, this does not
+    begin a new stretch.
+    """
     spread = angle[:, 0] - angle[:, 1]
     total = angle.sum(axis=1)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
@@ -226,7 +231,9 @@ def trend(time: Array, values: Array) -> float:
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample between two stretches at which the hip turns round, or the middle sample without markers."""
+    """Return the sample between two stretches at which the hip turns round, or the middle sample if the hip was not
+    recorded.
+    """
     begin = before.passings[-1][1]
     end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)
@@ -244,7 +251,7 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
     if noise > NOISY_RATIO * amplitude:
         yield (
             f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
-            "heel strikes, and so periods and lengths of single steps, are uncertain."
+            "heel strikes are uncertain, and with them periods and lengths of single steps."
         )
     for name, reason in walk.left_out.items():
         yield f"Not used: {name}: {reason.removesuffix('.')}."
@@ -260,47 +267,51 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples of a leg that return to a smooth course if a constant is subtracted."""
+    """Stretch of samples of a leg that lies on a smooth course if a constant is subtracted."""
 
     leg: int
     first: int
     end: int  # first sample after the stretch
     offset_rad: float
-    explained: float  # rad^2, squared residuals that the offset explains
+    explained: float  # sum of squared residuals (rad^2) that the offset explains
     lasts: bool  # whether the angle never returns to its course
 
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """Samples of the steps before and after a heel strike, and the span of time in which it may be."""
+    """Samples of the steps before and after a heel strike, and the span of time in which the strike may be."""
 
     time: Array
     angle: Array
     rows: NDArray[np.int64]  # indices of the samples in the recording
     span_s: tuple[float, float]
-    smooth_instant: float  # s, the instant of the strike in a smooth course
+    smooth_instant: float  # instant of the strike (s) in a smooth course
     step_s: float
     at_ends: tuple[bool, bool]  # whether the recording begins and ends with these samples
 
     def fit(self, at: float) -> tuple[Array, Array]:
-        """Return the orthonormal basis (samples, columns) of polynomials that meet at an instant, and the residuals."""
+        """Fit polynomials that meet at an instant. Return their orthonormal basis (samples, columns) and the
+        residuals.
+        """
         t = self.time - at
         columns = [np.ones((t.size, 1))]
         for side in (t < 0.0, t >= 0.0):
             degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
             t_side = np.where(side, t / self.step_s, 0.0)
-            # Repeated products take a tenth of the time that powers take.
+            # Repeated products are ten times faster than powers.
             columns.append(np.multiply.accumulate(np.broadcast_to(t_side[:, None], (t_side.size, degree)), axis=1))
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
         return basis, self.angle - basis @ (basis.T @ self.angle)
 
     @cached_property
     def smooth_fit(self) -> tuple[Array, Array]:
-        """Basis and residuals of a smooth course."""
+        """Basis and residuals of the fit of a smooth course."""
         return self.fit(self.smooth_instant)
 
     def scatter(self) -> Array:
-        """Return the residuals of the smooth course, scaled up because the fit follows part of the scatter."""
+        """Return the residuals of the smooth course. They are scaled up, because the fit follows part of the
+        scatter.
+        """
         basis, residuals = self.smooth_fit
         free = 1.0 - np.sum(basis**2, axis=1)
         clear = free > MIN_NORM
@@ -323,7 +334,7 @@ class Strike:
         longest = max(1, int(np.searchsorted(self.time, self.time[0] + MAX_STRETCH * self.step_s)))
         lengths = np.unique(np.geomspace(1, longest, LENGTH_TRIALS).astype(int))
         low, high = self.inner_samples(BORDER)
-        # To save time, long stretches are tried at widely spaced positions. The best one is refined below.
+        # To save time, try long stretches only at widely spaced positions. The best one is refined below.
         short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
         inner = np.arange(*self.inner_samples(LASTING_BORDER, whole=False))
         count = self.time.size
@@ -332,7 +343,7 @@ class Strike:
         first, end, leg = best_span(sums, spans)
         lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
         if not lasts:
-            # Refine: try all spans whose ends are near those of this one.
+            # Try all spans whose ends are near those of the best one.
             near = np.arange(-1 - (end - first) // 4, 2 + (end - first) // 4)
             around = np.stack(np.meshgrid(first + near, end + near), axis=2).reshape(-1, 2)
             fits = (around[:, 0] >= low) & (around[:, 1] <= high) & (around[:, 1] > around[:, 0])
@@ -342,7 +353,8 @@ class Strike:
         return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
 
     def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
-        """Return the samples (first, end) farther from the ends than `part` of a step. Other fits cover the rest.
+        """Return the samples (first, end) that are farther from the ends than the fraction `part` of a step. Other fits
+        cover the rest.
 
         whole  whether to go up to an end of the recording
         """
@@ -352,18 +364,18 @@ class Strike:
 
 
 def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int) -> Array:
-    """Return the instants (spans,) of the smallest costs, in s.
+    """Return the instants (spans,) with the smallest costs (s).
 
     spans     (spans, 2) s, where to search
-    costs_at  function from instants (spans, trials) to their costs
-    counts    numbers of trials, in ever smaller intervals
+    costs_at  function that returns the costs of instants (spans, trials)
+    counts    numbers of trials, each in a smaller interval
     """
     begin, end = spans.T
     each = np.arange(len(spans))
     for count in counts:
         trials = np.linspace(begin, end, count, axis=1)
         costs = costs_at(trials)
-        # The next interval, and the parabola at the end, need a trial on each side of the best.
+        # The next interval and the final parabola need a trial on each side of the best one.
         best = np.clip(np.argmin(costs, axis=1), 1, count - 2)
         begin, middle, end = (trials[each, best + k] for k in (-1, 0, 1))
     # Take the vertex of the parabola through the best trials.
@@ -379,7 +391,7 @@ def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> 
 
 
 def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return for spans (first, end) the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
+    """Return, for spans (first, end), the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
 
     sums  cumulative sums of the fit's orthonormal basis and of its residuals
     """
@@ -391,14 +403,14 @@ def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Ar
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
     """Return first sample, end and leg of the span that explains most of the residuals."""
     norm, share = parts_of(sums, spans)
-    # Over some spans polynomials follow a constant almost entirely. Dividing by the rest would magnify rounding.
+    # In some spans, polynomials can follow a constant almost completely. Dividing by the rest would magnify rounding.
     explained = np.where(norm > MIN_NORM, 1.0 / np.maximum(norm, MIN_NORM), 0.0)[:, None] * share**2
     best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
     return int(spans[best, 0]), int(spans[best, 1]), int(leg)
 
 
 def find_stretches(time: Array, angle: Array) -> list[Stretch]:
-    """Find the stretches of samples (of the recording) at which a leg is off its smooth course.
+    """Find the stretches of samples of the recording in which a leg is off its smooth course.
 
     time   (samples,) s, rising
     angle  (samples, 2) rad, from the vertical
@@ -410,7 +422,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     course = course_of(time, angle, found)
     strikes = course.strikes(range(len(course.spans)))
     sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
-    # Polynomials through sparse samples would follow errors, too.
+    # Polynomials through sparse samples would also follow errors.
     if not sampled or np.max(np.diff(time)) > MAX_GAP * course.step_s:
         return found
     scatter = MAD_TO_DEVIATION * float(
@@ -439,7 +451,8 @@ def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
             returns = moved[first, leg] * moved[back, leg] < 0.0 and time[back] - time[first] < longest_s
             if returns:
                 found.append(Stretch(leg, first + 1, back + 1, float(moved[first, leg]), 0.0, lasts=False))
-            # If the second jump does not undo the first, only the first is dropped: the second may begin a stretch.
+            # If the second jump does not undo the first, drop only the first, because the second may begin another
+            # stretch.
             jumps = jumps[2 if returns else 1 :]
     return found
 
@@ -448,7 +461,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
-        """Return the worst stretch in addition to others, or None if it is within the limit."""
+        """Return the stretch that explains most if `others` are removed, or None if it explains less than the limit."""
         strike = course.remove_stretches(others).strikes([index])[0]
         if strike.best_stretch(strike.smooth_fit).explained <= JOINT_SEARCH_FRACTION * limit:
             return None
@@ -462,7 +475,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     found: list[Stretch] = []
     while len(found) < MAX_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
-    # Each stretch was found without the later ones. With them, it may no longer be needed.
+    # Each stretch was found before the later ones. With them, it may no longer be needed.
     for stretch in found[:-1]:
         others = [other for other in found if other is not stretch]
         found = found if worst(others) else others
@@ -478,7 +491,8 @@ class Course:
     rows: NDArray[np.int64]  # indices of the samples in the recording
     spans: list[tuple[float, float]]
     step_s: float
-    # Not in `__init__`, so that `replace` drops them: guesses made with wrong samples are wrong once these are removed.
+    # These are not arguments of `__init__`, so that `replace` drops them. Guesses that were made with wrong samples
+    # must not remain once these are removed.
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
@@ -508,7 +522,9 @@ class Course:
         ]  # fmt: skip
 
     def ends_around(self, index: int) -> tuple[float, float, tuple[float, float]]:
-        """Return the beginning and end (s) of the steps around a strike, and the span of time in which to search it."""
+        """Return the beginning and end (s) of the steps around a strike, and the span of time in which to search for
+        it.
+        """
         begin, end = self.spans[index]
         at = self.guesses[index]
         farthest = MAX_FIT_TIME * self.step_s
@@ -518,7 +534,7 @@ class Course:
         return first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
 
     def guess(self, indices: Iterable[int]) -> None:
-        """Add first guesses of the times at which rates jump, for some spans and their neighbours."""
+        """Add first guesses of the times at which rates jump, for the spans with these indices and their neighbours."""
         nearby = {near for index in indices for near in (index - 1, index, index + 1)}
         new = sorted(nearby.intersection(range(len(self.spans))) - self.guesses.keys())
         spans = [self.spans[index] for index in new]
@@ -542,7 +558,9 @@ class Course:
 
 
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
-    """Return the course of a recording without some stretches: rates jump while one leg is far ahead of the other."""
+    """Return the course of a recording without some stretches. Each span in which one leg is far ahead contains a jump
+    of the rates.
+    """
     course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
     time = course.time
     angle = course.angle
@@ -554,7 +572,7 @@ def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> C
     )
     runs: list[tuple[int, int]] = []
     for first, last in apart:
-        # Outliers make brief runs, and divide a run into two.
+        # Outliers make brief runs, and can divide one run into two.
         whole = time[last] - time[first] >= shortest or first == 0 or last == time.size - 1
         goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
         if whole:

@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk runs along the horizontal line on which the legs move most relative to each other. In which of the two
-directions, shows only when the legs pass each other, see `leg_angles`.
+The walk is along the horizontal line on which the legs move most relative to each other. Which of the two directions it
+has shows only when the legs pass each other, see `leg_angles`.
 """
 
 from __future__ import annotations
@@ -21,23 +21,25 @@ Line = tuple[Array, Array]
 
 MAX_NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
 MIN_JUMP: Final = 8.0  # smallest change of length that counts as a jump, in standard deviations of all changes
-MIN_RELATIVE_JUMP: Final = 0.01  # and as a fraction of the length
-NEIGHBOURS: Final = 5  # a change is compared with the median of this many neighbouring changes
-MAX_VALUE: Final = 1e50  # larger values count as gaps, because their squares overflow
-MIN_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
-MAX_LEAP: Final = 1.5  # a leap may span at most this many times the number of frozen samples before it
+MIN_RELATIVE_JUMP: Final = 0.01  # the same as a fraction of the length
+NEIGHBOURS: Final = 5  # number of neighbouring changes with whose median a change is compared
+MAX_VALUE: Final = 1e50  # values above this count as gaps, because their squares overflow
+MIN_FROZEN: Final = 3  # minimum number of missing samples for which a marker counts as frozen
+# maximum number of samples of normal motion that a leap covers, as a multiple of the frozen samples before it
+MAX_LEAP: Final = 1.5
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 MAX_SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
 MAX_HIP_MOTION: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
 MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
-RUNNING_CORRELATION: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
+# correlation of hip height with the distance of the feet above which a walk is a run; near -1 in walking
+RUNNING_CORRELATION: Final = 0.5
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
-FAST_PERCENT: Final = 80  # motions between samples above this percentile count as fast
+FAST_PERCENT: Final = 80  # motions between samples are fast above this percentile
 # An exchange of legs lowers the squared unevenness by at least this many squared fast motions.
 MIN_EXCHANGE_GAIN: Final = 0.2
-# It also lowers it by at least this multiple of the median squared unevenness.
+# The exchange also lowers the squared unevenness by at least this multiple of its median.
 MIN_SCATTER_RATIO: Final = 40.0
 
 
@@ -83,10 +85,10 @@ def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[i
 
 
 def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
-    """Find the samples (samples,) at which two points are exchanged, at most half of all.
+    """Find the samples (samples,) at which two points are exchanged. They are at most half of all samples.
 
-    Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each one must make the
-    motion more even by more than fast motions or scatter can explain.
+    Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each exchange must make
+    the motion more even by more than fast motions or scatter explain.
 
     apart  (samples, axes) difference of the two points
     """
@@ -125,14 +127,14 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     mended = np.where(swapped[:, None], -apart, apart)
     rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
     for first, last in apart_runs(swapped, swapped):
-        # If one of the two points has an outlier here, this is not an exchange.
+        # This is no exchange if one of the two points has an outlier here.
         if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
             swapped[first : last + 1] = False
     return np.asarray(swapped)
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Undo exchanges between the markers of both legs. Return the lines, and a doubt for each exchanged pair."""
+    """Undo exchanges between the markers of the two legs. Return the lines, and a doubt for each exchanged pair."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -162,8 +164,8 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     """Find the plane of a walk from the lines between its markers.
 
     lines  line of each quantity, by name
-    walks  direction in the view of the recording: left, right, away or towards. If it is empty, the direction is that
-           in which the legs move most relative to each other, with the sign of the upper marker's drift
+    walks  direction in the view of the recording: left, right, away or towards. If it is empty, it is the direction in
+           which the legs move most relative to each other, with the sign of the drift of the upper marker
     """
     legs = legs_among(lines)
     upright = np.mean([np.mean(top - bottom, axis=0) for top, bottom in legs], axis=0)
@@ -172,13 +174,14 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     if walks:
         return WalkPlane(up, stated_direction(walks, up))
     against = [bottom - top for top, bottom in legs]
-    two = len(legs) > 1 and not np.array_equal(against[0], against[1], equal_nan=True)  # one leg may stand for both
+    # One recorded leg may stand for both.
+    two = len(legs) > 1 and not np.array_equal(against[0], against[1], equal_nan=True)
     motion = against[0] - (against[1] if two else 0.0)
     motion = (motion - np.mean(motion, axis=0)) * ~vertical
     for _ in range(PLANE_FITS):
-        # The small term puts horizontal directions first, even if the legs do not move.
+        # The small term prefers horizontal directions even if the legs do not move.
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
-        # Left in, a marker that jumps sideways would turn the plane.
+        # A marker that jumps sideways would otherwise turn the plane.
         off = np.abs(motion @ sideways - np.median(motion @ sideways))
         motion = motion[
             off <= MIN_JUMP * MAD_TO_DEVIATION * np.median(off) + MIN_RELATIVE_JUMP * np.ptp(motion @ ahead)
@@ -190,7 +193,8 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
 def stated_direction(walks: str, up: Array) -> Array:
     """Return the direction (axes,) of a walk that goes left, right, away or towards in the recording's view.
 
-    Right is the first horizontal axis. Away is across it and upwards, so that the three are right-handed.
+    Right is the first horizontal axis. Away is the horizontal direction that makes right, away and up a right-handed
+    system.
     """
     upwards = np.append(up, 0.0)[:3]
     right = np.eye(3)[int(upwards[0] != 0.0)]
@@ -204,10 +208,10 @@ def stated_direction(walks: str, up: Array) -> Array:
 def replace_unseen(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Replace the coordinates of markers that were not seen by gaps. Also return the reasons, by column.
+    """Mark the coordinates of markers that were not seen as gaps. Also return the reasons, by column.
 
-    Programs write zeros, or another value, for all coordinates of a marker that they did not see. A foot may also stand
-    at the origin, so equal coordinates are a gap only if they give the line an unusual length.
+    Programs write zeros, or some other value, for all coordinates of a marker that they did not see. A foot may also
+    stand at the origin, so equal coordinates are a gap only if they give the line an unusual length.
 
     pairs  columns of both ends for each coordinate
     """
@@ -252,7 +256,8 @@ def frozen_rows(places: Array) -> NDArray[np.bool_]:
 
 
 def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[NDArray[np.bool_], list[str]]:
-    """Find the samples at which a marker freezes, or the length of a line jumps and returns. Also return doubts.
+    """Find the samples at which a marker freezes, or at which the length of a line jumps and returns. Also return
+    doubts.
 
     Legs are rigid and knees bend smoothly, so the length of a line never really jumps.
     """
@@ -279,7 +284,7 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         lasting = np.zeros(length.size, bool)
         while jumps:
             first = jumps.pop(0)
-            # Two jumps in opposite directions are a brief change of the length.
+            # Two jumps in opposite directions mean that the length changed briefly.
             if jumps and sudden[first] * sudden[jumps[0]] < 0.0:
                 brief[first + 1 : jumps.pop(0) + 1] = True
             else:
@@ -328,7 +333,7 @@ def refuse_running(lines: Mapping[str, Line], plane: WalkPlane, source: str) -> 
     hip = np.mean([top @ plane.up for top, _ in legs], axis=0)
     if np.count_nonzero(np.diff(np.sign(spread - np.mean(spread)))) < FEWEST_SWINGS or not np.ptp(hip):
         return
-    # On a slope the hip also sinks steadily, so the trend is removed.
+    # On a slope the hip also sinks steadily, so remove the trend.
     trend = np.polynomial.Polynomial.fit(np.arange(hip.size), hip, 1)
     if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING_CORRELATION:
         raise ConfigError(

@@ -25,12 +25,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.engine_scene import EngineContact, contact_target
-from walkerlab.exchange.exported import Exported, Pad
+from walkerlab.exchange import engine_scene, exported
 from walkerlab.exchange.planar import UPRIGHT, Ball, PlanarModel
-from walkerlab.physics.ground.knees import MIN_FLEXION
-from walkerlab.physics.ground.normal_force import Impact
-from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground import knees, normal_force, terrain
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.parts import knee_dampings
@@ -82,7 +79,7 @@ class Hinge(NamedTuple):
 UNNAMED: Mapping[int, Hinge] = {}
 
 
-def contact_settings(target: EngineContact) -> dict[str, float]:
+def contact_settings(target: engine_scene.EngineContact) -> dict[str, float]:
     """Compute the settings with which MuJoCo's contact reproduces the target, by the formulas at the top of this
     module.
 
@@ -164,7 +161,7 @@ def body_text(
 ) -> str:
     """Write a link with its hinge, feet and child links.
 
-    contact  settings of the foot contacts; None for a walker without feet
+    contact  settings of the foot contacts, or None for a walker without feet
     hinges   hinges that have a name, by the link below the hinge
     """
     link = model.links[link_number]
@@ -233,7 +230,7 @@ def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) ->
     return f'solref="{-stiffness!r} {-damping!r}" solimp="{d!r} {d!r} 1 0.5 1"'
 
 
-def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity") -> str:
+def walker_text(export: exported.Exported, head: Iterable[str], slope: Slope = "gravity") -> str:
     """Write a model with pads and a keyframe `gait`. From there, a passive compass walks with nothing but `mj_step`.
 
     head   lines of the header comment
@@ -241,7 +238,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
 
     Raises ConfigError for a walker or ground that MJCF cannot express.
     """
-    target = contact_target(export.scene)
+    target = engine_scene.contact_target(export.scene)
     if target is None:
         raise ConfigError(
             "MuJoCo's contact cannot be tuned to ground without friction.", "Set contact.friction=coulomb."
@@ -294,18 +291,18 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
     return f"<!--\n{comment}\n-->\n{ElementTree.tostring(tree, encoding='unicode')}\n"
 
 
-def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
+def time_step_s(export: exported.Exported, contact: Mapping[str, float]) -> float:
     """Return a time step that resolves the damping of the lightest foot and of the knee stops, rounded to one digit."""
     weights = inverse_weights(export.model)
     stop = export.scene.ours.stop
     rates = [contact["damping_N_s_m"] * weights.bodies[ball.link] for ball in export.model.balls]
-    if isinstance(stop, Impact):
+    if isinstance(stop, normal_force.Impact):
         shanks = [weights.joints[link] for link in export.knee_links]
         rates += [max(stop.damping * weight, math.sqrt(stop.stiffness * weight)) for weight in shanks]
     return min(STEP_S, float(f"{DAMPED_STEP / max(rates):.0e}"))
 
 
-def hinge_names(export: Exported) -> dict[int, Hinge]:
+def hinge_names(export: exported.Exported) -> dict[int, Hinge]:
     """Return the hinges of hip and knees, with names, the hip spring, dampers and the stops of compliant knees."""
     hip = export.hip
     weights = inverse_weights(export.model).joints
@@ -315,7 +312,7 @@ def hinge_names(export: Exported) -> dict[int, Hinge]:
     for leg, link in enumerate(export.knee_links):
         acts = f'damping="{knee_dampings(export.config.walker)[leg]!r}" '
         d = IMPEDANCE
-        if isinstance(stop, Impact):
+        if isinstance(stop, normal_force.Impact):
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
             # Knees bend towards negative angles. Their lower limit is too far away to act.
             acts += f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
@@ -323,7 +320,7 @@ def hinge_names(export: Exported) -> dict[int, Hinge]:
     return hinges
 
 
-def limbs(export: Exported, foot: int) -> dict[int, Position]:
+def limbs(export: exported.Exported, foot: int) -> dict[int, Position]:
     """Return the lower end (m) of each link of a leg, from its foot up to the hip."""
     ball = export.model.balls[foot]
     link = ball.link
@@ -350,7 +347,7 @@ def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
     return f'<geom type="capsule" fromto="{ends}" size="{width!r}" contype="0" conaffinity="0" rgba=".4 .5 .7 1"/>'
 
 
-def pad_text(export: Exported, number: int, pad: Pad) -> str:
+def pad_text(export: exported.Exported, number: int, pad: exported.Pad) -> str:
     """Write a pad as a box that collides only with the ball of its lane."""
     size = f"{0.5 * pad.length_m!r} {export.half_lane_m!r} {0.5 * PAD_M!r}"
     z = pad.height_m + export.model.balls[pad.foot].ground_m - 0.5 * PAD_M
@@ -359,7 +356,7 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
     return f'<geom name="pad_{number + 1}" type="box" size="{size}" pos="{place}" {group} rgba=".6 .6 .55 1"/>'
 
 
-def custom_texts(export: Exported) -> Iterator[str]:
+def custom_texts(export: exported.Exported) -> Iterator[str]:
     """Yield the values that the script reads: drives, rules of the knees, periods and lengths of walkerlab's steps."""
     first, second = export.impulses_N_s
     hip = export.hip
@@ -368,21 +365,21 @@ def custom_texts(export: Exported) -> Iterator[str]:
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
     if export.knee_links:
         at_touch = int(export.scene.ours.whole.release_at_touch)
-        yield f'<numeric name="knees" data="{MIN_FLEXION!r} {at_touch}"/>'
+        yield f'<numeric name="knees" data="{knees.MIN_FLEXION!r} {at_touch}"/>'
     steps = (walk.periods_s, walk.lengths_m) if walk.steps else ((0.0,), (0.0,))
     values = " ".join(repr(float(value)) for values in steps for value in values)
     yield f'<numeric name="steps_in_walkerlab" data="{values}"/>'
 
 
-def lock_texts(export: Exported) -> Iterator[str]:
+def lock_texts(export: exported.Exported) -> Iterator[str]:
     """Yield the locks of the knees. At the start, only that of the stance leg is active."""
     for leg in range(len(export.knee_links)):
-        active = "true" if leg == STANCE_FOOT else "false"
+        active = "true" if leg == terrain.STANCE_FOOT else "false"
         knee = f'joint1="knee_{leg + 1}" polycoef="0 0 0 0 0"'
         yield f'<joint name="lock_{leg + 1}" {knee} active="{active}" {COUPLING_SETTINGS}/>'
 
 
-def coupling_texts(export: Exported) -> Iterator[str]:
+def coupling_texts(export: exported.Exported) -> Iterator[str]:
     """Yield the constraints of coupled hinges.
 
     Raises ConfigError for a coupling of more than two hinges.
@@ -401,7 +398,7 @@ def coupling_texts(export: Exported) -> Iterator[str]:
         yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {COUPLING_SETTINGS}/>'
 
 
-def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
+def tuning_lines(export: exported.Exported, target: engine_scene.EngineContact) -> Iterator[str]:
     """Describe which properties of the contact law MuJoCo's contact reproduces, and which it lacks."""
     static = float(export.scene.ours.friction.largest)
     yield (
@@ -416,7 +413,7 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
     )
 
 
-def parts_of_script(export: Exported) -> list[str]:
+def parts_of_script(export: exported.Exported) -> list[str]:
     """List the drives and the locks of knees that only the script can simulate."""
     parts = {"push-offs": max(export.impulses_N_s), "hip torque": export.hip.torque_N_m}
     parts |= {"locks of the knees": len(export.knee_links)}

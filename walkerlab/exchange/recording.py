@@ -1,7 +1,8 @@
 """Read time series from files that other programs or people wrote.
 
 `read_recording` chooses the format by the file extension: delimited text (CSV, ADAMS tables), ADAMS results (.res),
-OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to quantities of a walk.
+OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` finds the quantities of a walk among their
+columns.
 """
 
 import csv
@@ -30,11 +31,11 @@ from numpy.typing import NDArray
 from walkerlab.config.fields import DECIMAL_COMMA
 from walkerlab.errors import ConfigError
 
-csv.field_size_limit(2**31 - 1)  # a cell may hold a long comment
+csv.field_size_limit(2**31 - 1)  # A cell may contain a long comment.
 
 Array = NDArray[np.float64]
 Row = tuple[int, list[str]]
-"""Line number of a row, as an editor shows it, and the cells of the row."""
+"""Line number of a row as an editor shows it, and the cells of the row."""
 
 DEG_RAD: Final = math.pi / 180.0
 ANGLES: Final = {
@@ -70,12 +71,12 @@ TIME_NAMES = [
         rf"(?i:(?:time|time[\s_]?stamp|t)[\s_](?:{'|'.join(UNIT_VALUES['time'])}))", "T",
     )
 ]  # fmt: skip
-"""Patterns of names of a time column. T comes last, because it may be a temperature."""
+"""Patterns for the name of a time column. T comes last, because it may be a temperature."""
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
-"""Pattern for a unit in brackets behind a name. It excludes [2] and [:,2], which count the parts of a vector."""
+"""Pattern for a unit in brackets after a name. It excludes [2] and [:,2], which are indices of vector components."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
-"""Texts of cells without a value, in lower case."""
+"""Texts, in lower case, of cells that have no value."""
 THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
 COMMAS_AND_BLANKS: Final = re.compile(r" *[-+]?\d+,\d+(?: +[-+]?\d+,\d+(?:[eE][-+]?\d+)?)+ *")
@@ -91,9 +92,9 @@ CLOCKS: Final = tuple(
 DAY_S: Final = 86400.0
 SEGMENTS: Final = "Sports2D (angles)"
 SEGMENT_NAMES: Final = frozenset({"right thigh", "left thigh"})
-"""Names of segments, in a table of angles that Sports2D wrote."""
+"""Names of segments in a table of angles that Sports2D wrote."""
 NO_FILE: Final = "there is no such file"
-LONGEST_PATH: Final = 200  # maximum number of characters of a path in a message
+LONGEST_PATH: Final = 200  # maximum number of characters of a path in messages
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
 ACCEPTED_FORMATS: Final = (
@@ -152,18 +153,20 @@ class Recording:
     """Time series of a recording as stored in the file, before any unit conversion. Missing values are nan."""
 
     path: Path
-    columns: dict[str, Array]  # (samples,) arrays by name
+    columns: dict[str, Array]  # values (samples,) by name of the column
     units: dict[str, str] = field(default_factory=dict)  # unit by column as written in the file, if it states one
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
-    # by column: why it cannot be used, such as a cell with text
+    # reason, by column, why it cannot be used, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
-    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker: why it has gaps
+    unseen: dict[str, str] = field(default_factory=dict)  # reason, by column of a marker, why it has gaps
     levelled_by: str = ""  # program that turns angles until the floor is level
 
     @property
     def time_name(self) -> str | None:
-        """Name of the time column, or None. Earlier patterns of TIME_NAMES take precedence over later ones."""
+        """Name of the time column, or None if there is none. Earlier patterns of TIME_NAMES take precedence over later
+        ones.
+        """
         return next((name for pattern in TIME_NAMES for name in self.columns if pattern.fullmatch(name)), None)
 
 
@@ -190,9 +193,9 @@ def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, .
     name = f"{'.'.join(key)}: {shown}" if key else shown
     try:
         mode = path.stat().st_mode
-        # Folders are not refused here: the attempt to read one raises an OSError with the right reason.
+        # A folder is not refused here, because the attempt to read it raises an OSError with the right reason.
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            advice = "Save what it delivers as a file first."
+            advice = "Save its output as a file first."
             raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
         return reader(path)
     except OSError as error:
@@ -210,7 +213,7 @@ def build_recording(
 ) -> Recording:
     """Build a recording from columns in order. Columns without a name are left out.
 
-    problems  for each column, why it cannot be used, or ''. Columns that share a name cannot be used either
+    problems  for each column, the reason why it cannot be used, or ''. Columns that share a name cannot be used either
     """
     columns = dict(zip(names, values, strict=True))
     reasons = {name: reason for name, reason in zip(names, problems, strict=False) if reason}
@@ -238,11 +241,11 @@ def read_delimited(path: Path) -> Recording:
 
 def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
     """Return the columns (count, samples) of a table whose cells are all plain numbers, or None for another table."""
-    # NumPy would warn of input without rows.
+    # NumPy would warn about input without rows.
     if not any(map(str.strip, lines)):
         return None
     try:
-        # `comments=None`, so that a '#' is text in a cell, for which the caller has a message.
+        # With `comments=None`, a '#' is text in a cell, for which the caller has a message.
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
@@ -250,13 +253,13 @@ def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | N
 
 
 def merge_headers(lines: list[str]) -> list[str]:
-    """Return the lines of a table of DeepLabCut with one row of names, such as hip.x, instead of three or four."""
+    """Return the lines of a DeepLabCut table with one row of names, such as hip.x, instead of three or four."""
     rows = list(csv.reader(lines[:4]))
     coords = next((number for number, row in enumerate(rows) if row[:1] == ["coords"]), 0)
     if not coords or rows[0][:1] != ["scorer"]:
         return lines
     names = [".".join(parts) for parts in zip(*(row[1:] for row in rows[1 : coords + 1]), strict=False)]
-    # Blank lines replace the old header, so that line numbers in messages stay right.
+    # Blank lines take the place of the old header, so that line numbers in messages stay right.
     return [*[""] * coords, ",".join(["frame", *(f'"{name}"' for name in names)]), *lines[coords + 1 :]]
 
 
@@ -266,7 +269,7 @@ def remove_blanks(lines: list[str]) -> list[str]:
     if not COMMAS_AND_BLANKS.fullmatch(last):
         return lines
     count = len(last.split())
-    # Names may contain single blanks. So a line is split at wider gaps if that gives the right number of cells.
+    # Names may contain single blanks. So split a line at wider gaps if that gives the right number of cells.
     names = [re.split(" {2,}", line.strip()) for line in lines]
     return [";".join(wide if len(wide) == count else line.split()) for line, wide in zip(lines, names, strict=True)]
 
@@ -285,7 +288,7 @@ def text_of(path: Path) -> str:
             text = data.decode(encoding)
         except (UnicodeDecodeError, LookupError):
             continue
-        # Latin-1 decodes any bytes, so binary data are recognised only by a NUL.
+        # Latin-1 decodes any bytes, so only a NUL reveals binary data.
         if "\0" in text:
             break
         return text
@@ -302,10 +305,11 @@ def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[Row]:
 
 
 def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[str], int]:
-    """Find the header: the first row of names above a row of as many values, perhaps with a row of units between them.
+    """Find the header, which is the first row of names above a row of as many values. A row of units may be between
+    them.
 
     Returns the delimiter, the names, the units ('' without a row of units), and the line number of the first values.
-    Tables with several columns are preferred to those with one, and names that are words to those that are numbers.
+    Tables with several columns are preferred to tables with one, and names that are words to names that are numbers.
     """
     tops = [(delimiter, list(rows_of(lines[:HEADER_LINES], delimiter))) for delimiter in DELIMITERS]
     places = [(rows[k : k + 3], delimiter) for delimiter, rows in tops for k in range(len(rows) - 1)]
@@ -329,12 +333,12 @@ def find_header(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[
 
 
 def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
-    """Raise ConfigError for a file that is empty, has no rows, or separates its columns by another character."""
+    """Raise ConfigError for a file that is empty, has no rows, or separates columns by an unsupported character."""
     rows = [line for line in lines if line.strip()]
     if not rows:
         raise ConfigError(f"{path} is empty.", "Export it again.")
     if len(rows) == 1 and any(character.isalpha() for character in rows[0]):
-        raise ConfigError(f"{path} has a header and no rows of numbers.", "Export it again, with its samples.")
+        raise ConfigError(f"{path} has a header but no rows of numbers.", "Export it again, with its samples.")
     for separator, name in (("|", "vertical bars"), (":", "colons"), (None, "blanks")):
         cells = [[cell.strip() for cell in row.split(separator)] for row in rows[-2:]]
         if all(sum(map(is_number, row)) > 1 for row in cells):
@@ -344,7 +348,7 @@ def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
 
 
 def trim_blank_end(cells: list[str], count: int) -> list[str]:
-    """Return the first `count` cells of a row if the others are empty, otherwise the row."""
+    """Return the first `count` cells of a row if all others are empty, otherwise the whole row."""
     return cells if any(cells[count:]) else cells[:count]
 
 
@@ -416,7 +420,7 @@ def table_of(
 
 
 def clock_times(cells: Sequence[str]) -> Array | None:
-    """Return the seconds of clock times, dates with times or durations, or None for a column of other cells.
+    """Convert clock times, dates with times, or durations to seconds. Return None for a column of other cells.
 
     Times of day continue after midnight.
     """
@@ -439,17 +443,16 @@ def seconds_of(cell: str) -> float:
         date = datetime.fromisoformat(cell)
     except ValueError:
         return math.nan
-    # Without a zone Python would assume the local one, in which times jump when summer time begins and ends.
+    # Without a time zone Python would assume the local one, in which times jump when summer time begins and ends.
     return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
-    """Parse the cells of a column.
+    """Parse the cells of a column. Return the values and ''. If a cell is no number, return incomplete values and the
+    reason.
 
-    Returns the values and '', or, if a cell is no number, incomplete values and the reason.
-
-    lines       line number of each cell
-    has_points  returns whether the file has numbers with a decimal point
+        lines       line number of each cell
+        has_points  function that returns whether the file has numbers with a decimal point
     """
     try:
         return np.array([float(cell or "nan") for cell in cells]), ""
@@ -472,7 +475,9 @@ def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callabl
 
 
 def read_adams_results(path: Path) -> Recording:
-    """Read XML results of ADAMS (.res): components with ids, and steps with a number for each component."""
+    """Read XML results of ADAMS (.res). They define components by ids, and have a number for each component in every
+    step.
+    """
     try:
         root = ElementTree.fromstring(text_of(path))
     except ElementTree.ParseError as error:
@@ -480,7 +485,7 @@ def read_adams_results(path: Path) -> Recording:
             f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
         ) from None
     components = component_names(path, root)
-    # Only the block initialConditions has the state at time 0. Blocks named modelInput are not part of the walk.
+    # The state at time 0 is only in the block initialConditions. Blocks named modelInput are not part of the walk.
     blocks = (block for block in root.iterfind(".//{*}Data") if not block.get("name", "").startswith("modelInput"))
     steps = [step for block in blocks for step in block.iterfind("{*}Step")]
     if not steps:
@@ -524,7 +529,7 @@ def parse_step(path: Path, number: int, step: ElementTree.Element, count: int) -
         ) from None
     if len(values) != count:
         raise ConfigError(
-            f"{path}: step {number} holds {len(values)} numbers for {count} components.", "Export the results again."
+            f"{path}: step {number} has {len(values)} numbers for {count} components.", "Export the results again."
         )
     return values
 
@@ -536,7 +541,7 @@ def xml_units(root: ElementTree.Element) -> dict[str, str]:
 
 
 def drop_repeated_times(recording: Recording) -> Recording:
-    """Keep the last of several samples at one time, because blocks begin with the last sample of the previous block."""
+    """Keep only the last of several samples at one time. A block begins with the last sample of the previous block."""
     time = recording.columns.get(recording.time_name or "", np.zeros(0))
     last = np.append(np.diff(time) != 0.0, True) if time.size else np.zeros(0, bool)
     return replace(recording, columns={name: column[last] for name, column in recording.columns.items()})
@@ -546,7 +551,9 @@ def drop_repeated_times(recording: Recording) -> Recording:
 
 
 def read_opensim(path: Path) -> Recording:
-    """Read an OpenSim table (.sto, .mot) or SIMM's variant: settings up to `endheader`, column names, and rows."""
+    """Read an OpenSim table (.sto, .mot) or its variant from SIMM: settings up to `endheader`, column names,
+    and rows.
+    """
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     start = next((number for number, line in enumerate(lines) if end is not None and number > end and line.strip()), 0)
@@ -561,13 +568,14 @@ def read_opensim(path: Path) -> Recording:
     if "\t" not in lines[start]:
         lines = ["\t".join(line.split()) for line in lines]
     units = {"length": "m", "time": "s", "angle": angle_unit(path, settings)}
-    # The rows are counted, because their number in the header is often wrong.
+    # Count the rows, because their number in the header is often wrong.
     table = table_of(path, names, lines, start + 2, "\t", {}, {kind: unit for kind, unit in units.items() if unit})
     return replace(table, levelled_by=SEGMENTS if table.columns.keys() >= SEGMENT_NAMES else "")
 
 
 def angle_unit(path: Path, settings: Mapping[str, str]) -> str:
-    """Return the unit of the angles in an OpenSim table as OpenSim 4.6 reads it, or '' if its header contradicts that.
+    """Return the unit in which OpenSim 4.6 reads the angles of an OpenSim table, or '' if the header of the table
+    contradicts it.
 
     A .mot file without a version is from SIMM, in degrees. Other tables are in radians unless they say inDegrees=yes.
     """
@@ -594,7 +602,7 @@ def read_markers(path: Path) -> Recording:
         )
     settings = dict(zip(split_at_tabs(lines[1]), split_at_tabs(lines[2]), strict=False))
     labels = split_at_tabs(lines[3].rstrip())
-    # Usually a name stands over the first of three coordinates. Some programs write the names side by side.
+    # Usually a name is above the first of three coordinates. Some programs write the names side by side.
     spread = not any(labels[3::3]) and not any(labels[4::3])
     markers = labels[2::3] if spread else labels[2:]
     count = sum(map(bool, split_at_tabs(lines[4]))) // 3
@@ -634,7 +642,7 @@ def read_c3d(path: Path) -> Recording:
     labels = [str(label).strip() for label in arrays["labels"]]
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
     if not any(labels) or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(labels):
-        raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")
+        raise ConfigError(f"{path} has no markers or no frame rate.", "Export it again.")
     # ezc3d adds a fourth coordinate to each point.
     values = places[:3, : len(labels)].transpose(1, 0, 2).reshape(-1, places.shape[2])
     unit = str(arrays["units"][0]).strip() if arrays["units"].size else ""
@@ -645,11 +653,11 @@ def read_c3d(path: Path) -> Recording:
 
 def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
-    with path.open("rb"):  # raises OSError for an unreadable file; ezc3d does not
+    with path.open("rb"):  # This raises OSError for an unreadable file, which ezc3d does not.
         pass
     # A child process runs ezc3d, because damaged files crash it with segmentation faults.
     try:
-        # With -P, modules in the working folder cannot take the place of the real ones.
+        # Without -P, modules in the working folder could take the place of the real ones.
         command = [sys.executable, "-P", "-c", C3D_PROGRAM, str(path)]
         done = subprocess.run(command, capture_output=True, check=True, timeout=C3D_PATIENCE_S)
         with np.load(BytesIO(done.stdout), allow_pickle=False) as arrays:
@@ -666,7 +674,7 @@ READERS: Final[dict[str, Callable[[Path], Recording]]] = {
     ".c3d": read_c3d,
 }
 FORMAT_ADVICE: Final = {
-    ".req": "Request files differ between versions of ADAMS; export .res (RESULTS/XRF) or a table instead.",
+    ".req": "Request files differ between versions of ADAMS. Export .res (RESULTS/XRF) or a table instead.",
     ".xlsx": "Save the sheet as CSV.",
     ".xls": "Save the sheet as CSV.",
     ".mat": "Export the columns as CSV.",

@@ -1,9 +1,9 @@
 """Find the heel strikes in recorded angles.
 
 A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
-neighbouring crossings of one leg count as one strike. It is timed by the zero of the height in a smooth fit of angles:
-one polynomial before the strike and one after it, which meet at the strike, because only the rates jump. The scatter of
-the angles around the fit gives the standard error of that time.
+neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
+one polynomial before the strike and one after it. They meet at the strike, because only the rates jump there. The
+scatter of the angles around the fit gives the standard error of that time.
 
 Measured from the slope's normal, the leg angles are opposite at heel strike. An error in slope or sensor offset makes
 their sum non-zero where the rates jump: `sums_at_jumps` finds it.
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 Height = Callable[[Array], Array]
 
 DEGREES: Final = range(1, 7)
-"""Degrees of polynomials to try. The samples decide which one is used."""
+"""Degrees of polynomials that are tried. The samples decide which one is used."""
 ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
 """`DEGREES` and the next degree, whose fit shows the bias of the highest one."""
 MIN_SAMPLES: Final = 6
@@ -37,17 +37,18 @@ ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
 MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
 SIGNIFICANT_ERRORS: Final = 3.0  # a value within this many standard errors of zero counts as zero
-STRIKE_DURATION_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
+# duration of a heel strike on compliant ground, below which no fit can resolve its time
+STRIKE_DURATION_S: Final = 1e-4
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
-JUMP_SAMPLES: Final = 10  # fewest samples in that time
+JUMP_SAMPLES: Final = 10  # minimum number of samples in that time
 JUMP_DEGREE: Final = 4
-# A jump counts if it is displaced by this many standard errors. They are many, because many instants are tried.
+# A jump counts if it is displaced by this many standard errors. The number is large, because many instants are tried.
 JUMP_ERRORS: Final = 4.5
 MAX_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
 SIDES: Final = 2
-MIN_SIDE_RATIO: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
+MIN_SIDE_RATIO: Final = 1 / 3  # minimum number of samples on one side of a fit, as a fraction of those on the other
 MIN_SQUARES: Final = 1e-30  # rad^2, added to sums of squares because the logarithm of 0 does not exist
 NORMAL_QUARTILE: Final = 0.6745  # median absolute value of a normal variable with standard deviation 1
 WINDOW_AHEAD: Final = 0.4
@@ -55,21 +56,22 @@ WINDOW_AHEAD: Final = 0.4
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
 MAX_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
-WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
+WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned to about this number
 SAMPLES_ON_A_SIDE: Final = 4  # minimum number of samples for a fit, before and after an instant
 DEGREE: Final = 3
 MIN_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
-SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
+SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # trial values (rad) of the sum of leg angles
 MOST_FOUND: Final = 4
-RIDGE: Final = 1e-15  # relative; without it, samples at nearly equal times would make equations singular
+RIDGE: Final = 1e-15  # relative term added to equations, because samples at nearly equal times would make them singular
 
 
 @dataclass(frozen=True)
 class StrikeFit:
     """Polynomials through the angles of both legs before and after an instant, at which they meet."""
 
-    angle: Array  # (2,) at the instant
-    rates: dict[str, Array]  # (2,) before and after it, by `before` and `after`; absent if there are too few samples
+    angle: Array  # (2,) angles at the instant
+    # rates (2,) before and after the instant, under `before` and `after`; absent if there are too few samples
+    rates: dict[str, Array]
     squares: float  # sum of the squared residuals
     freedoms: int  # number of values minus number of coefficients
     deviation: float  # standard error of either angle
@@ -92,7 +94,9 @@ class Touch:
 
 
 Problem = tuple[Array, Array, float, Sequence[int]]
-"""Times (samples,), angles (samples, 2), the instant at which the polynomials meet, and their degrees, rising."""
+"""Times (samples,), angles (samples, 2), the instant at which the polynomials meet, and their degrees in rising
+order.
+"""
 Fits = dict[int, StrikeFit]  # by degree
 
 
@@ -121,14 +125,13 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     """Return the candidate heel strikes, where the front foot comes down to the level of the rear one: the time, the
     leg, and the sum of the foot's heights up to there. Noise can produce several candidates for one strike.
     """
-    # A recording may end at a heel strike, so that the crossing comes just after it. So it is continued by half an
-    # interval.
+    # If a recording ends at a heel strike, the crossing may come just after it, so continue it by half an interval.
     before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[before])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
     spread = angle[:, 0] - angle[:, 1]
     over = height(angle)
-    # The feet are also level as the legs pass each other, where neither leg is far ahead.
+    # The feet are also level as the legs pass each other, but then neither leg is far ahead.
     apart = WINDOW_AHEAD * np.abs(spread).max()
     sums = np.cumsum(over)
     crossings = []
@@ -142,9 +145,8 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
 
 
 def merge_repeats(crossings: Sequence[tuple[float, int, float]], apart_s: float) -> list[tuple[float, int, float]]:
-    """Keep only one of the consecutive crossings of a leg that are nearer to each other than `apart_s` (s).
-
-    This is the one with the largest sum of heights: before it the foot was above the other one, after it below.
+    """Keep only one of the consecutive crossings of a leg that are less than `apart_s` (s) apart. It is the one with
+    the largest sum of heights, because the foot is above the other foot before this crossing and below it afterwards.
     """
     strikes: list[list[tuple[float, int, float]]] = []
     for crossing in crossings:
@@ -159,7 +161,7 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     """Return the heel strike with which a recording begins, or None if it begins at another instant.
 
     The first sample counts as a heel strike if the height fitted there is zero within three standard errors, and if the
-    standard error is short when expressed as a time.
+    standard error corresponds to a short time.
     """
     spread = angle[:, 0] - angle[:, 1]
     begin = float(time[0])
@@ -175,7 +177,8 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     if touch is None or touch.error_s >= PRECISE_S or off > SIGNIFICANT_ERRORS * touch.error_s:
         return None
-    # A strike just before the recording looks like one at the first sample. The error includes the distance in the fit.
+    # A strike just before the recording looks like one at the first sample, so the error includes the distance between
+    # them in the fit.
     return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
 
 
@@ -184,7 +187,7 @@ def locate_touch(
 ) -> Generator[Problem, Fits, Touch | None]:
     """Locate the heel strike near a crossing by fits, which `fit_together` makes for all strikes at once.
 
-    Returns None if there are too few samples, or the foot does not fall.
+    Returns None if there are too few samples, or if the foot does not fall.
     """
     t, y = samples_near(time, angle, near, period)
     farthest = 0.5 * float(np.abs(t).max())
@@ -193,7 +196,7 @@ def locate_touch(
     degree = DEGREES[0]
     touch = None
     for iteration in range(ITERATIONS):
-        # The degree is chosen again, because the best one shows only once the polynomials meet near the strike.
+        # Choose the degree again, because the best one shows only when the polynomials meet near the strike.
         choosing = iteration < DEGREE_ITERATIONS
         fits = yield t, y, at, ALL_DEGREES if choosing else (degree, degree + 1)
         degree = best_degree(fits) if choosing else degree
@@ -203,7 +206,7 @@ def locate_touch(
             fit = fits.get(degree + 1) or fit
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch and touch.fall_m_s <= 0.0 and DEGREES[0] in fits:
-            # Noise can bend a curve upwards at its end, but hardly a line.
+            # Use a line, because noise can bend the end of a curve upwards.
             touch = touch_of(fits[DEGREES[0]], height, near + at, leg)
         if touch is None or touch.fall_m_s <= 0.0:
             return None
@@ -212,7 +215,7 @@ def locate_touch(
         if iteration >= DEGREE_ITERATIONS and abs(correction) < MAX_CORRECTION * touch.error_s:
             return touch_of(add_bias(touch.fit, fits.get(degree), fits.get(degree + 1)), height, near + at, leg)
         at += correction
-    # If samples keep changing sides, the zero keeps moving. Its error is then the size of its moves.
+    # If samples keep changing sides, the zero keeps moving. Its error is then as large as its moves.
     if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
         return None
     return replace(touch, error_s=float(np.hypot(touch.error_s, correction)))
@@ -234,7 +237,9 @@ def fit_together(searches: Sequence[Generator[Problem, Fits, Touch | None]]) -> 
 
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
-    """Return the samples around an instant (times from it, and angles), with more of the step if samples are sparse."""
+    """Return the samples around an instant: times from it, and angles. If samples are sparse, they cover more of the
+    step.
+    """
     row = int(np.searchsorted(time, near))
     away = np.sort(np.abs(time[max(0, row - 2 * MIN_SAMPLES) : row + 2 * MIN_SAMPLES] - near))
     wanted = float(away[: 2 * MIN_SAMPLES][-1])
@@ -248,7 +253,7 @@ def rows_within(time: Array, instant: float, half: float) -> slice:
 
 
 def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
-    """Return the heel strike of a leg at the time (s) of a fit."""
+    """Build the heel strike of a leg from a fit that meets at the time `time` (s)."""
     # This is close to the best step for central differences in double precision.
     small = 1e-6 * np.eye(2)
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
@@ -265,7 +270,9 @@ def best_degree(fits: Fits) -> int:
 
 
 def add_bias(fit: StrikeFit, narrow: StrikeFit | None, wide: StrikeFit | None) -> StrikeFit:
-    """Return a fit whose error includes its bias: the change from the `narrow` fit to the `wide` one, one degree up."""
+    """Add the bias of a fit to its error. The bias is the change from the `narrow` fit to the `wide` fit, which is one
+    degree higher.
+    """
     change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 
@@ -302,7 +309,7 @@ def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
 def fit_sides(
     times: Sequence[Array], values: Sequence[Array], sides: Sequence[str], degrees: Sequence[int]
 ) -> list[Fits]:
-    """Fit polynomials of each degree, on these sides of the time 0, which meet there, to each of some problems.
+    """Fit polynomials of each degree to each problem, on these sides of the time 0, where they meet.
 
     Columns are in the order of the degrees, so that one factorisation serves all of them.
     """
@@ -322,7 +329,7 @@ def fit_sides(
     inverse = np.linalg.inv(triangle)
     shares = orthonormal.mT @ y
     left = np.sum((y - orthonormal @ shares) ** 2, axis=(1, 2)) + MIN_SQUARES
-    # Sums over the columns that a lower degree lacks, and over those that it has.
+    # sums over the columns that a lower degree lacks, and over those that it has
     missed = np.pad(np.cumsum(np.sum(shares**2, axis=2)[:, ::-1], axis=1)[:, ::-1], ((0, 0), (0, 1)))
     variances = np.cumsum(inverse[:, 0] ** 2, axis=1)
     fits: list[Fits] = [{} for _ in times]
@@ -345,10 +352,11 @@ def fit_sides(
 def angles_at_jumps(
     time: Array, angle: Array, touches: Sequence[Touch], period: float, errors: float = JUMP_ERRORS
 ) -> tuple[float, Array, NDArray[np.int64]] | None:
-    """Find where rates jump near heel strikes. Return their delay (s), and angles (jumps, 2) and legs (jumps,) there.
+    """Find jumps of the rates near heel strikes. Return their delay (s), and the angles (jumps, 2) and legs (jumps,) at
+    the jumps.
 
-    All strikes are shifted by the same time, the one that leaves the smallest residuals. Returns None unless the shift
-    exceeds `errors` of its standard errors and PRECISE_S.
+    The delay is the same for all strikes. It is the shift that leaves the smallest residuals. Returns None unless the
+    shift exceeds `errors` of its standard errors and PRECISE_S.
 
     period  step period (s)
     errors  number of standard errors
@@ -377,7 +385,7 @@ def angles_at_jumps(
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
     variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
-    # At an end of the range, the true minimum may lie beyond it, so it does not count either.
+    # A minimum at an end of the range does not count either, because the true one may lie beyond.
     if squares[shifts == 0.0][0] - least <= errors**2 * variance or not 0 < index < shifts.size - 1:
         return None
     # Find the minimum by a parabola through three trials.
@@ -393,7 +401,8 @@ def angles_at_jumps(
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return likely sums (rad) of the leg angles at heel strikes, where the leg rates jump. Clearest jumps come first.
+    """Return likely sums (rad) of the leg angles at heel strikes, beginning with the sum at which leg rates jump most
+    clearly.
 
     time   (samples,) s
     angle  (samples, 2) rad, from the vertical
@@ -405,7 +414,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
     evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MAX_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
-    # The comparisons differ, so that only the first of equal neighbours is a peak.
+    # The two comparisons differ, so that of equal neighbours only the first is a peak.
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
     return [float(SUMS[peak]) for peak in peaks[np.argsort(-evidence[peaks])][:MOST_FOUND]]
 
@@ -441,7 +450,7 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
 
 def noise_of(angle: Array) -> float:
     """Return the standard deviation (rad) of the scatter of angles (samples, 2) from sample to sample."""
-    # In third differences the smooth motion hardly shows. Their variance is 20 times that of the noise.
+    # Third differences hardly contain the smooth motion. Their variance is 20 times that of the noise.
     return (
         float(np.median(np.abs(np.diff(angle, 3, axis=0)))) / (NORMAL_QUARTILE * 20.0**0.5) if len(angle) > 3 else 0.0
     )
@@ -455,23 +464,24 @@ def typical_interval(instants: Sequence[float], time: Array) -> float:
 def squares_around(
     parts: Sequence[tuple[Array, Array]], instants: Array, degree: int, samples_per_degree: int = 1
 ) -> Array:
-    """Return the squared residuals (parts, instants) of polynomials before and after each instant that meet there.
+    """Fit polynomials before and after each instant that meet there, and return the squared residuals (parts,
+    instants).
 
     parts               times (samples,), rising, and values (samples, legs) of each part of a recording
     instants            (parts, instants) rising along each row
     degree              highest degree of the polynomials
-    samples_per_degree  number of samples of a side that it needs for each degree above 1
+    samples_per_degree  number of samples that a side needs for each degree above 1
     """
     counts = np.array([np.searchsorted(t, row) for (t, _), row in zip(parts, instants, strict=True)])
     rest = np.array([[t.size] for t, _ in parts]) - counts
     degrees = np.minimum(degree, 1 + np.stack((counts, rest)) // samples_per_degree)
     before = squares_before(parts, instants, counts, degrees[0])
-    # The fit after an instant is a fit before it with time reversed.
+    # A fit after an instant is a fit before it in reversed time.
     mirrored = [(-t[::-1], y[::-1]) for t, y in parts]
     after = [
         values[:, ::-1] for values in squares_before(mirrored, -instants[:, ::-1], rest[:, ::-1], degrees[1, :, ::-1])
     ]
-    # Making both sides meet adds their squared gap over the sum of the variances of both values.
+    # If both sides must meet, the residuals grow by their squared gap over the sum of the variances of both values.
     gaps = np.sum((before[1] - after[1]) ** 2, axis=2)
     return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
 
@@ -508,14 +518,14 @@ def squares_before(
 def products_of(
     part: tuple[Array, Array], instants: Array, counts: NDArray[np.int64], degree: int
 ) -> tuple[list[Array], Array]:
-    """Return the products of polynomials and values, summed between samples, and the polynomials at the instants.
+    """Sum the products of polynomials and values over samples. Also return the polynomials at the instants.
 
-    counts  (instants,) samples up to which each sum extends, from the one before
+    counts  (instants,) number of samples before the end of each sum, which begins where the previous one ended
     """
     end = int(counts.max())
     first, last = part[0][0], max(part[0][end - 1], instants.max())
     times = np.concatenate((part[0][:end], instants))
-    # Chebyshev polynomials, because powers would make the normal equations too ill-conditioned.
+    # Use Chebyshev polynomials, because powers would make the normal equations too ill-conditioned.
     basis = chebvander(2.0 * (times - first) / (last - first or 1.0) - 1.0, degree)
     columns = np.concatenate((basis[:end], part[1][:end]), axis=1)
     return [columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], basis[end:]

@@ -1,4 +1,4 @@
-"""Divide a recorded walk into steps: heel strikes, lengths, and each leg's angle and velocity."""
+"""Divide a recorded walk into steps, with heel strikes, step lengths, and angle and velocity of each leg."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-# An angle that reaches backwards this many times as far as at heel strikes is that of a shank.
+# An angle belongs to a shank if it reaches backwards this many times as far as at heel strikes.
 SHANK_SWING_RATIO: Final = 1.4
 MAX_SPREAD_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
@@ -50,7 +50,7 @@ INTERVALS: Final = 24  # largest number of knot intervals of the spline through 
 MAX_STEP_SAMPLES: Final = 250  # largest number of samples kept within a step
 MAX_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
-"""Shortest and longest plausible step, in s or m. Other values are damaged or in another unit."""
+"""Smallest and largest plausible duration (s) or length (m) of a step. Other values are damaged or in another unit."""
 MIN_SPREAD_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
 MIN_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
 MAX_SCATTER: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
@@ -59,33 +59,37 @@ MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
 SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
-"""Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
-MAX_CLOCK_RATIO: Final = 1.15  # a clock that differs more from the swinging legs raises a doubt
-NOISE_IN_CLOCK: Final = 7.0  # the limit grows by this multiple of the scatter of the angles, relative to the angles
-TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
+"""Largest relative difference between the distance over a belt and that from the leg angles that raises no doubt."""
+# ratio of clock rates above which a clock that contradicts the swing of the legs raises a doubt
+MAX_CLOCK_RATIO: Final = 1.15
+NOISE_IN_CLOCK: Final = 7.0  # multiple of the relative scatter of the angles by which that limit grows
+TURN_RAD: Final = 1e-3  # rotation of the walker for the difference quotient of its potential energy
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-MAX_SPACING: Final = 0.2  # values must be recorded at least this finely to show an error, as a fraction of the error
-MAX_ERROR_SCATTER: Final = 0.25  # an error counts as constant if it scatters over a step by at most this fraction
-MIN_DISTANCE_M: Final = 1e-30  # m, smallest distance by which a value is divided
+# largest spacing of recorded values, as a fraction of an error, with which they can show the error
+MAX_SPACING: Final = 0.2
+MAX_ERROR_SCATTER: Final = 0.25  # largest scatter over a step, as a fraction, with which an error counts as constant
+MIN_DISTANCE_M: Final = 1e-30  # m; distances that are divisors are at least this large
 # time from the last sample of a step to the heel strike, as a fraction of the duration of the walk
 STRIKE_MARGIN: Final = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 is the leg that swings first."""
+    """Recorded walk from its first heel strike on. In arrays (samples, 2), column 0 belongs to the leg that swings
+    first.
+    """
 
     time_s: Array  # (samples,) s, from the first heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
-    touch_time_s: Array  # (steps,) ends of the steps
-    touch_error_s: Array  # (steps + 1,) standard errors of the heel strikes, the first one included
+    touch_time_s: Array  # (steps,) s, ends of the steps
+    touch_error_s: Array  # (steps + 1,) standard errors of the heel strikes (s), including the first one
     length_m: Array  # (steps,)
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
-    origin_s: float  # time of the recording at the first heel strike
+    origin_s: float  # time of the first heel strike in the recording
     doubts: tuple[str, ...]  # oddities of the heel strikes
 
 
@@ -93,7 +97,8 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     """Find the steps of a recorded walk.
 
     source         name of the recording, for messages
-    touch_sum_rad  sum of the leg angles from the slope's normal at heel strike; not 0 if slope or sensors have an error
+    touch_sum_rad  sum of the leg angles from the slope's normal at heel strike (rad), which is not 0 if slope or
+    sensors have an error
 
     Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """
@@ -108,13 +113,13 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
     if model.legs_differ and len(touches) > 1 and touches[1].leg == 1:
-        touches = touches[1:]  # leg 1 must swing first, as in computed walks
+        touches = touches[1:]  # Leg 1 must swing first, as in computed walks.
     if len(touches) < 2:
         raise ConfigError(
-            f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
+            f"{source} holds no complete step: {len(touches)} heel strikes were found, and the largest angle is "
             f"{float(np.abs(angle).max()):.3g} rad.",
             "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "and over at least one whole step; the slope must be that of the ground (slope_deg).",
+            "and over at least one whole step. The slope must be that of the ground (slope_deg).",
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
@@ -124,12 +129,13 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    # Energy jumps at heel strikes. If their times are uncertain, nothing can be said about the clock.
+    # Energy jumps at heel strikes, so if their times are uncertain, nothing can be said about the clock.
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
 def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
-    """Return the vectors (samples,) in m from the hip over the foot centre of leg 0 to that of leg 1, normal + i along.
+    """Return the vectors (samples,) between two positions of the hip (m): above leg 0 and above leg 1, if the foot
+    centres of both legs were at one point. The real part is normal to the slope, and the imaginary part along it.
 
     angles  (samples, 2) of straight legs, from the vertical
     """
@@ -141,7 +147,9 @@ def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
 
 
 def rise_of_soles(model: RigidModel) -> float:
-    """Return the foot radius of leg 1 minus that of leg 0 (m). Leg 0 stands in the exchanged model."""
+    """Return the foot radius of leg 1 minus that of leg 0 (m). In the model with exchanged legs, leg 0 is the stance
+    leg.
+    """
     return float(model.radius - model.exchanged.radius)
 
 
@@ -157,17 +165,17 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Return the walk without the forward lean of the direction from which angles are measured, the camera's tilt.
+    """Subtract the tilt of the camera, which is the forward lean of the direction from which angles are measured.
 
-    It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
+    The tilt follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
     angle = read_leg_angles(walk)
     total = partial(sum_over_level, model)
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # The search begins away from the likely sum. The shift from there to the jumps of the rates is larger than its
-        # error. A smaller one would count as no shift, and the rough sum would remain.
+        # Begin the search away from the likely sum, so that the shift to the jumps of the rates is larger than its
+        # error. A smaller shift would count as none, and the rough sum would remain.
         return np.asarray((total(angles) - sum_rad - SEARCH_OFFSET_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -221,7 +229,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     sizes = np.bincount(steps.step)
     means = np.add.reduceat(columns, np.cumsum(sizes) - sizes) / sizes[:, None]
     columns -= means[steps.step]
-    # The two coefficients are the components of gravity in the tilted axes, so together they give its magnitude.
+    # The two coefficients are the components of gravity in tilted axes, so together they give the magnitude of gravity.
     gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
     rate = gravity**-0.5 if gravity else 1.0
     far = MAX_CLOCK_RATIO + NOISE_IN_CLOCK * steps.scatter_rad / float(np.std(angles))
@@ -268,11 +276,11 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
 
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
-    """Yield a sentence for each leg of a kneed walker whose angle may not be that of the thigh."""
+    """Yield a doubt for each leg of a kneed walker whose angle may not be that of the thigh."""
     for leg, name in enumerate(("angle 1", "angle 2")):
         if not (model, model.exchanged)[leg].kneed:
             continue
-        # The minimum itself may be an outlier.
+        # A percentile is safer than the minimum, which may be an outlier.
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -293,13 +301,13 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Disagreement between the two signs of a heel strike: jumps of the leg rates, and level feet."""
+    """Disagreement between the two signs of a heel strike, which are jumps of the leg rates and level feet."""
 
     shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
     sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
-    lengths_m: list[float]  # mean length of the steps of each leg, if they alternate
+    lengths_m: list[float]  # mean step length of each leg, if lengths alternate
     limps: bool  # whether periods alternate
-    between_rad: float | None  # constant by which angle 1 exceeds angle 2; None if the difference is not constant
+    between_rad: float | None  # constant by which angle 1 exceeds angle 2, or None if the difference is not constant
 
 
 def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float) -> Mismatch:
@@ -322,7 +330,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 
 def alternates(first: Array, second: Array) -> bool:
-    """Whether the means of two samples differ clearly, as those of odd and even steps of a limp do."""
+    """Whether the means of two samples differ clearly, like those of odd and even steps in a limp."""
     if min(first.size, second.size) < MIN_ALTERNATING_STRIKES:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
@@ -331,7 +339,9 @@ def alternates(first: Array, second: Array) -> bool:
 
 
 def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | None:
-    """Return the constant (rad) by which angle 1 exceeds angle 2 in all phases of their steps, or None."""
+    """Return the constant (rad) by which angle 1 exceeds angle 2 in all phases of their steps, or None if there is
+    none.
+    """
     phases = np.linspace(0.0, 1.0, PHASES)
     courses: list[list[Array]] = [[], []]
     for begin, end in pairwise(touches):
@@ -340,7 +350,7 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
     if not courses[0] or not courses[1]:
         return None
     swing, stance = (np.mean(courses[0], axis=0)[k] - np.mean(courses[1], axis=0)[k] for k in (0, 1))
-    # The stance leg is the other one, so it shows the constant with the opposite sign.
+    # The stance leg is the other leg, so the constant has the opposite sign for it.
     differences = np.array([swing, -stance])
     constant = float(np.mean(differences))
     return constant if float(np.std(differences)) < MAX_ERROR_SCATTER * abs(constant) else None
@@ -349,7 +359,8 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
 def offset_doubts(
     time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Describe jumps of the rates while the feet are not level, and alternating steps, with the error behind them.
+    """Describe jumps of the rates while the feet are not level, and alternating steps, together with the error that
+    causes them.
 
     A constant error of the angles explains them if both disappear once it is subtracted.
     """
@@ -364,7 +375,7 @@ def offset_doubts(
     degrees = np.degrees(errors)
     digit = float(np.diff(np.unique(np.round(angle, 9))).min())
     if after.shift_s or after.lengths_m or after.limps or digit > MAX_SPACING * float(np.abs(errors).max()):
-        cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be the cause"
+        cause = "no constant error of the angles explains it, so a wrong gain, a tilt or coarse digits may be the cause"
     elif alternate:
         cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
     else:
@@ -448,7 +459,9 @@ def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
 
 
 def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
-    """Return the two neighbouring sample times (s) farthest apart, from just before `begin` to just after `end`."""
+    """Return the two neighbouring sample times (s) that are farthest apart between `begin` and `end`. The interval
+    includes one sample before it and one after it.
+    """
     first, last = np.searchsorted(time, begin, "right") - 1, np.searchsorted(time, end)
     instants = time[first : last + 1]
     widest = int(np.argmax(np.diff(instants)))
@@ -487,7 +500,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return the row of the sample, the heel strike, and the rates within the step, for both ends of a step."""
+    """Return, for both ends of a step, the row of the sample, the heel strike, and the rates within the step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))

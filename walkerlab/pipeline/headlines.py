@@ -1,7 +1,5 @@
 """Name the headline quantities of stages and the quantities that a sweep can record, and compare two runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -133,7 +131,7 @@ class RunDifference:
 
 
 def difference(
-    first: Mapping[str, Content], second: Mapping[str, Content], configs: Sequence[Config | None]
+    first: "Mapping[str, Content]", second: "Mapping[str, Content]", configs: "Sequence[Config | None]"
 ) -> RunDifference:
     """Compare the results and configs of two runs. An unknown config counts as empty."""
     both = [name for name in first if name in second]

@@ -1,7 +1,5 @@
 """Build the contact model of a config, with only the parts that the config needs, and starts with scaled velocities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,30 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkerlab.config import reads, walkers
 from walkerlab.config.contact import Contact
-from walkerlab.config.reads import ContactConfig, GroundConfig
-from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import NoAnswer
+from walkerlab.physics.ground import friction, normal_force, resting, terrain
 from walkerlab.physics.ground.compliant import ContactDrives, KneeRules, contact_walker
-from walkerlab.physics.ground.friction import FRICTION_LAWS
-from walkerlab.physics.ground.normal_force import NORMAL_LAWS, Impact
-from walkerlab.physics.ground.resting import RestingFoot
-from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.physics.ground.walker import floating_state
+from walkerlab.physics.hybrid import contact_state, recorded_walk
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
-from walkerlab.physics.hybrid.contact_state import Frame, JudgedGround
-from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.mechanics.parts import Assembly
 from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.mechanics.rigid_model import RigidModel
-from walkerlab.physics.orbits import scaled_starts
+from walkerlab.physics.orbits import contact_map, scaled_starts, step_map
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
-from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between_touches
-from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.laws import ground_law, hinge_law_of
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
+from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters, ground_law, hinge_law_of
 from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:
@@ -47,7 +37,7 @@ FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reac
 
 
 @dataclass(frozen=True)
-class ContactScene(WalkerOnGround):
+class ContactScene(contact_map.WalkerOnGround):
     pinned: bool  # whether a revolute joint holds the stance foot during the first step
     pitch_m: float
     assembly: Assembly
@@ -66,11 +56,11 @@ class ContactScene(WalkerOnGround):
         """
         even = self.ground.terrain
         ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
-        return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
+        return walk_contact(self.walker, ground, self.pinned, terrain.STANCE_FOOT, start, tolerances, steps, sampling)
 
 
 def contact_scene(
-    config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None, asymmetry: float = 0.0
+    config: reads.ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None, asymmetry: float = 0.0
 ) -> ContactScene:
     """Build the scene of a config with a contact block.
 
@@ -87,18 +77,18 @@ def contact_scene(
     drives = contact_drives(config)
     walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
     leg = config.walker.leg_length_m
-    frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
-    ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
+    frame = contact_state.Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
+    ground = contact_state.JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
 
 
-def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
+def tolerances_of(config: reads.GroundConfig, steps: int) -> Tolerances:
     settings = config.solver.contact
     return Tolerances(settings.method, settings.rtol, settings.atol, steps * BUDGET_PER_STEP)
 
 
 def scene_on_pads(
-    config: ContactConfig,
+    config: reads.ContactConfig,
     rigid_step: float,
     rigid_state: State,
     search: GaitAnswer | None = None,
@@ -118,12 +108,12 @@ def scene_on_pads(
         pitch = float(search.gait.lengths_m.mean())
         if len(search.gait.steps) > 1:
             # Pads lie where the feet touch. The distances between touches differ from those between sections.
-            first, second = lengths_between_touches(search.gait)
+            first, second = contact_map.lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)
 
 
-def contact_drives(config: ContactConfig) -> ContactDrives:
+def contact_drives(config: reads.ContactConfig) -> ContactDrives:
     law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
@@ -133,31 +123,31 @@ def contact_drives(config: ContactConfig) -> ContactDrives:
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
-    if not isinstance(walker, Kneed | AssembledWalker):
+    if not isinstance(walker, walkers.Kneed | walkers.AssembledWalker):
         return KneeRules()
     knee = walker.knee
     # If the knee is free during the rigid model's strike, it must not stay locked here while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    return KneeRules(Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
+    return KneeRules(normal_force.Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
 # Functions that build a terrain from pitch and asymmetry of the steps. At the start, leg 1 is a step behind leg 2.
-TERRAINS: dict[str, Callable[[float, float], Terrain]] = {
-    "checkerboard": lambda pitch, asymmetry: checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
-    "after-mid-swing": lambda pitch, _: after_mid_swing(pitch),
-    "plane": lambda pitch, _: plane(pitch),
+TERRAINS: dict[str, Callable[[float, float], terrain.Terrain]] = {
+    "checkerboard": lambda pitch, asymmetry: terrain.checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
+    "after-mid-swing": lambda pitch, _: terrain.after_mid_swing(pitch),
+    "plane": lambda pitch, _: terrain.plane(pitch),
 }
 
 
-def require_contact(config: ContactConfig) -> Contact:
+def require_contact(config: reads.ContactConfig) -> Contact:
     if config.contact is None:
         raise ValueError("this config has no contact block")
     return config.contact
 
 
-def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """Find the contact model's gait on pads whose pitch is the step length of that gait, starting from a rigid state.
 
     rigid_step_length_m  initial pad pitch
@@ -169,7 +159,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
 
 
-def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
+def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
     """Find the gait of the contact model on a plane that has no pads and lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":
@@ -198,7 +188,7 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
     Raises ConfigError if a law that an extension added is incomplete.
     """
     si = contact.to_si()
-    return ground_law(NORMAL_LAWS, si), ground_law(FRICTION_LAWS, si)
+    return ground_law(normal_force.NORMAL_LAWS, si), ground_law(friction.FRICTION_LAWS, si)
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
@@ -219,11 +209,11 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     if scene.pinned:
         return y
     n = turned.shape[1]
-    rolled = float(walker.whole.rolling[STANCE_FOOT, :n] @ turned[1])
+    rolled = float(walker.whole.rolling[terrain.STANCE_FOOT, :n] @ turned[1])
     return (*y[: 2 + n], y[2 + n] - rolled, *y[3 + n :])
 
 
-def stance_equilibrium(scene: ContactScene) -> RestingFoot:
+def stance_equilibrium(scene: ContactScene) -> resting.RestingFoot:
     walker = scene.walker
     # The static penetration is that under the whole weight, not under the component normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
@@ -253,17 +243,17 @@ def build_scaled_starts(
     gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
 
     def start(swing: float, stance: float) -> State:
-        return start_state(scene, scale_rates(rigid, state, swing, stance))
+        return start_state(scene, recorded_walk.scale_rates(rigid, state, swing, stance))
 
     starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, gait)
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
-def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
+def steps_to_settle_on(gait: step_map.Cycle) -> tuple[tuple[float, float], ...]:
     """Return period (s) and length (m) of each step of a gait: one step for equal legs, otherwise two."""
     if len(gait.steps) == 1:
         return ((gait.period_s, gait.step.length_m),)
-    return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))
+    return tuple(zip(gait.periods_s.tolist(), contact_map.lengths_between_touches(gait).tolist(), strict=True))
 
 
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:

@@ -11,14 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from walkerlab.config.files import builtin_names
-from walkerlab.config.loader import load
-from walkerlab.config.reads import RigidConfig, keys_of
-from walkerlab.config.schema import Config
-from walkerlab.config.walkers import Kneed
+from walkerlab.config import files, loader, reads, schema, walkers
+from walkerlab.physics.orbits import fixed_point, rigid_map
 from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
-from walkerlab.physics.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
-from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
 from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
@@ -28,7 +23,7 @@ COMMON_SLOPES = (0.03, 0.12)
 # rad. Gaits are followed at least to the first slope, and at most to the second.
 MIN_FOLLOWED_TO = 0.2
 MAX_FOLLOWED_TO = 0.35
-SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
+SUGGESTION_SEARCH = fixed_point.SearchSettings(random_starts=50, further_starts=100)
 SUGGESTION_POINTS = 60  # maximum number of points of a branch
 INSET = 0.1  # distance kept from the end of a range, as a fraction of the range
 FOOT_KEY = "foot_centre_ahead_m"
@@ -51,7 +46,7 @@ class SlopeRange:
         return near + INSET * (far - near)
 
 
-def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
+def find_slopes_with_gaits(config: schema.Config) -> SlopeRange | None:
     """Return the nearest range of slopes with gaits, or None if no gait is found. Stable gaits take precedence."""
     slope = config.slope_rad
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
@@ -67,12 +62,12 @@ def distance(span: tuple[float, float], value: float) -> float:
     return max(span[0] - value, value - span[1], 0.0)
 
 
-def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBranch, ...]:
+def follow(walker_at: rigid_map.WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBranch, ...]:
     walker = walker_at(value)
     if walker is None:
         return ()
-    gaits = [gait for gait in find_gaits(walker, settings=SUGGESTION_SEARCH).gaits if not gait.objections]
-    follower = BranchFollower(RigidMap(walker_at, span.size, walker), span, max_points=SUGGESTION_POINTS)
+    gaits = [gait for gait in fixed_point.find_gaits(walker, settings=SUGGESTION_SEARCH).gaits if not gait.objections]
+    follower = BranchFollower(rigid_map.RigidMap(walker_at, span.size, walker), span, max_points=SUGGESTION_POINTS)
     return follower.family([Seed(np.array(gait.z), value) for gait in gaits], 1)
 
 
@@ -93,7 +88,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
         yield SlopeRange(slopes, max(proper, key=lambda ends: ends[1] - ends[0], default=None))
 
 
-def suggest_gaits(scene: RigidConfig) -> str:
+def suggest_gaits(scene: reads.RigidConfig) -> str:
     """Suggest commands that find gaits for walkers or slopes near a scene that has none. On slopes that do not descend,
     return ''."""
     if scene.slope_rad <= 0.0:
@@ -126,37 +121,37 @@ def round_inward(low: float, high: float) -> tuple[float, float]:
     return rounded if rounded[0] < rounded[1] else (low, high)
 
 
-def rigid_config(scene: RigidConfig) -> Config:
+def rigid_config(scene: reads.RigidConfig) -> schema.Config:
     """Return a config with only the keys on which a gait of the rigid model depends."""
-    data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
+    data = {name: getattr(scene, name) for name in reads.keys_of(reads.RigidConfig)}
     push_off = {"impulse_N_s": scene.push_off.impulse_N_s, "leg_2": scene.push_off.leg_2}
-    return Config.model_validate({**data, "push_off": push_off})
+    return schema.Config.model_validate({**data, "push_off": push_off})
 
 
-def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
+def find_gait_with_feet_ahead(config: schema.Config) -> tuple[float, fixed_point.RigidGait] | None:
     """Return how far ahead of the shanks (m) the feet have to be for the most stable gait, and this gait, or None."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).vary(config, rigid_walker)(ahead_m)
-        gaits = () if walker is None else find_gaits(walker, settings=SUGGESTION_SEARCH).gaits
+        gaits = () if walker is None else fixed_point.find_gaits(walker, settings=SUGGESTION_SEARCH).gaits
         candidates += [(ahead_m, gait) for gait in gaits if not gait.objections]
     return min(candidates, key=lambda candidate: candidate[1].spectral_radius, default=None)
 
 
-def feet_ahead(config: Config) -> tuple[float, ...]:
-    if not isinstance(config.walker, Kneed):
+def feet_ahead(config: schema.Config) -> tuple[float, ...]:
+    if not isinstance(config.walker, walkers.Kneed):
         return ()
     # The distances are rounded as in the suggested command, so that the command finds the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 
-def name_feet_tried(config: Config) -> str:
+def name_feet_tried(config: schema.Config) -> str:
     tried = feet_ahead(config)
     return f", nor with feet {tried[0]:g} to {tried[-1]:g} m ahead of the shanks (walker.{FOOT_KEY})" if tried else ""
 
 
-def suggest_walkers(config: Config) -> str:
-    names = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
+def suggest_walkers(config: schema.Config) -> str:
+    names = [name for name in files.builtin_names() if loader.load(Path(name)).config.walker.type == config.walker.type]
     if not names:
         return ""
     return f" Begin with a built-in walker of this type (`-c NAME`: {', '.join(names)}) and change one key at a time."

@@ -93,10 +93,10 @@ LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over 
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
 PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
+NEAR_CONFIG: Final = 2.0  # loss of log-likelihood, two standard errors, below which estimates agree with the config
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
-RARE_GAIN: Final = 0.01  # a gain is not due to chance if it is less probable than this under the right model
-REFITS: Final = 3  # maximum number of refits with a freed parameter; each must raise the log-likelihood
+RARE_GAIN: Final = 1e-3  # a gain is not due to chance if it is less probable than this under the right model
 REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
 UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
@@ -435,14 +435,15 @@ def suggest_parameter(
     """Yield advice on a fixed parameter or nuisance that would explain the walk better if it were estimated, too, or
     that would alone explain it as well as the estimates do.
 
-    A parameter that was measured is doubted as soon as it explains the walk better. For any other one, such as gravity
-    or a spring that the config does not have, the gain must be too large to be due to chance.
+    A parameter that was measured is doubted as soon as it explains steps better that contradict the config. Otherwise,
+    and for parameters such as gravity or a spring that the config does not have, the gain must be too large to be due
+    to chance.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
     widened = [reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors)) for other in others]
     gains = np.array([evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened])
-    measured = np.array([other.measured for other in others])
+    measured = np.array([other.measured for other in others], bool)
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
     order = np.lexsort((-gains, ~measured)).tolist() if others else []
@@ -453,11 +454,13 @@ def suggest_parameter(
             f"config: measure it again, or estimate it as well (--fit {alone[1].name})"
         )
         return
-    for index in [each for each in order if gains[each] >= PROMISING_GAIN][:MAX_FREED]:
+    distance = distance_from_config(keys, fitted)
+    doubted = measured & (distance > NEAR_CONFIG) & (not fitted.forecast.measured.sampled)
+    for index in [each for each in order if gains[each] >= PROMISING_GAIN or doubted[each]][:MAX_FREED]:
         other = others[index]
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
-        if gain > DECISIVE_GAIN and (other.measured or rare) and abs(change) > SMALLEST_CHANGE:
+        if gain > DECISIVE_GAIN and (doubted[index] or rare) and abs(change) > SMALLEST_CHANGE:
             option = "--nuisance" if other.name in NUISANCES else "--fit"
             yield (
                 f"{describe_change(other, change)} would raise the log-likelihood by about {gain:.3g}: "
@@ -523,22 +526,17 @@ def gain_of_freeing(
     step = evaluate(rows, fitted.noise).move
     if np.abs([*step[:count], step[-1] if other.value else 0.0]).max() < LINEAR_MOVE:
         noise, _ = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise, fitted.noises)
-        free = evaluate(rows, noise)
-        return float(free.likelihood - fitted.evaluation.likelihood), float(free.move[-1])
+        linear = evaluate(rows, noise)
+        return float(linear.likelihood - fitted.evaluation.likelihood), float(linear.move[-1])
     if not other.measured or subject.model != RIGID:
         return 0.0, 0.0
-    start = np.insert(fitted.u, count, other.value / other.scale)
     wider = problem_for(subject, (*keys, other.name), [*problem.bounds, UNBOUNDED], problem)
-    like = fitted
-    u = start
-    # Standard deviations may change back and forth between refits. A gain that a refit loses does not count.
-    for _ in range(REFITS):
-        refitted = refit(wider, u, like)
-        if refitted is None or refitted.evaluation.likelihood - fitted.evaluation.likelihood <= DECISIVE_GAIN:
-            return 0.0, 0.0
-        like = refitted
-        u = refitted.u
-    return float(like.evaluation.likelihood - fitted.evaluation.likelihood), float(u[count] - start[count])
+    free = fit(wider, np.insert(fitted.u, count, other.value / other.scale))
+    if free is None or free.reason:
+        return 0.0, 0.0
+    return float(free.evaluation.likelihood - fitted.evaluation.likelihood), float(
+        free.u[count]
+    ) - other.value / other.scale
 
 
 def problem_for(

@@ -4,8 +4,6 @@ The list follows from the config alone, so it is available before anything is lo
 measures the savings in time and bytes (docs/performance.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -30,15 +28,15 @@ class LeftOut:
 # `LeftOut` as stored in summaries.
 Entry = dict[str, str]
 # Number of values per sample, by output.
-RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
-CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
+RIGID_NUMBERS: "Mapping[Output, int]" = {"states": 10, "energies": 3, "forces": 4}
+CONTACT_NUMBERS: "Mapping[Output, int]" = {"states": 10, "energies": 8, "forces": 8}
 
 
-def rigid_walk_omissions(config: SimulateConfig) -> tuple[Entry, ...]:
+def rigid_walk_omissions(config: "SimulateConfig") -> tuple[Entry, ...]:
     return (stance_omission(config), *leg_omissions(config), *output_omissions(config.outputs, "rigid", RIGID_NUMBERS))
 
 
-def stance_omission(config: RigidConfig) -> Entry:
+def stance_omission(config: "RigidConfig") -> Entry:
     """Describe what the rigid model omits at the stance foot. The foot of a compass is a point, but others may roll."""
     if config.walker.type == "compass":
         return omission(
@@ -53,7 +51,7 @@ def stance_omission(config: RigidConfig) -> Entry:
     )
 
 
-def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
+def contact_walk_omissions(config: "ContactSimConfig") -> tuple[Entry, ...]:
     contact = config.contact
     omissions = [omission("force law of a foot in the air", "no ground touches it", "one of two force laws in a swing")]
     if contact is not None and not contact.has_friction:
@@ -71,20 +69,20 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
     return (*omissions, *leg_omissions(config), *output_omissions(config.outputs, "contact", CONTACT_NUMBERS))
 
 
-def count_step_angles(walker: Walker) -> int:
+def count_step_angles(walker: "Walker") -> int:
     """Count the angles during a step. With a compliant knee stop, the stance shank also has one."""
     from walkerlab.config.walkers import Kneed, rigid_bodies  # imported here to keep the help fast
 
     return rigid_bodies(walker) + int(isinstance(walker, Kneed) and walker.knee.lock == "compliant")
 
 
-def leg_omissions(config: RigidConfig) -> Iterator[Entry]:
+def leg_omissions(config: "RigidConfig") -> Iterator[Entry]:
     if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
         saved = "nothing: its terms are constants, summed before the walk starts"
         yield omission("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
-def output_omissions(outputs: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
+def output_omissions(outputs: "tuple[Output, ...]", model: str, numbers: "Mapping[Output, int]") -> Iterator[Entry]:
     for output, count in numbers.items():
         if output not in outputs:
             what = f"{output} of the {model} walk in time"

@@ -8,11 +8,9 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from walkerlab.config import fields
+from walkerlab.config import fields, reads, writer
 from walkerlab.config.problems import nearest, printable
-from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
-from walkerlab.config.writer import slope_in_degrees
 from walkerlab.errors import ConfigError
 
 R = TypeVar("R")
@@ -21,7 +19,7 @@ SECOND_LEG = "leg_2"
 SLOPE_DEG = "slope_deg"
 SLOPE_RAD = "slope_rad"
 # Top-level config keys that models depend on.
-MODEL_KEYS = tuple(keys_of(ContactConfig))
+MODEL_KEYS = tuple(reads.keys_of(reads.ContactConfig))
 
 
 @dataclass(frozen=True)
@@ -34,16 +32,16 @@ class Parameter:
     def varies_second_leg(self) -> bool:
         return SECOND_LEG in self.path
 
-    def value_in(self, config: ContactConfig) -> float:
+    def value_in(self, config: reads.ContactConfig) -> float:
         value = stated_value(config, self.path)
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
-    def config_at(self, config: ContactConfig, value: float) -> Config | None:
+    def config_at(self, config: reads.ContactConfig, value: float) -> Config | None:
         """Return the config at another value, with the defaults that depend on it recomputed, or None if the schema
         rejects it."""
         return config_with(config, (self,), (value,))
 
-    def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
+    def refusal(self, config: reads.ContactConfig, value: float, key: Key) -> ConfigError:
         """Build the error for a value that the config key `key` requests and the schema rejects, with the reason."""
         why = ""
         try:
@@ -62,7 +60,7 @@ class Parameter:
             key,
         )
 
-    def vary(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
+    def vary(self, config: reads.ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""
 
         def make_at_value(value: float) -> R | None:
@@ -72,7 +70,7 @@ class Parameter:
         return make_at_value
 
 
-def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:
+def config_with(config: reads.ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:
     """Return the config at values of several parameters (parameters,), or None if the schema rejects them."""
     try:
         return _changed(config, parameters, values)
@@ -80,7 +78,7 @@ def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: 
         return None
 
 
-def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config:
+def _changed(config: reads.ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config:
     data = {name: _keys_set(getattr(config, name)) for name in MODEL_KEYS}
     for parameter, value in zip(parameters, values, strict=True):
         block = data
@@ -95,7 +93,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
 SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
-def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
+def stated_value(config: reads.ContactConfig, path: tuple[str, ...]) -> Any:
     """Return the value at a path of keys. If a key of the second leg is omitted, its value is that of the first leg."""
     value = fields.value_at(config, path)
     return fields.value_at(config, first_leg_path(path)) if value is None else value
@@ -106,7 +104,7 @@ def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in path if name != SECOND_LEG)
 
 
-def mass_of_second_leg(config: ContactConfig) -> str | None:
+def mass_of_second_leg(config: reads.ContactConfig) -> str | None:
     """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
     paths = (
         path for path, _ in fields.leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg")
@@ -127,7 +125,7 @@ def dotted(key: Key) -> str:
     return ".".join(part for part in key if isinstance(part, str))
 
 
-def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
+def parameter_of(key: str, config: reads.ContactConfig, asker: Key = ()) -> Parameter:
     """Return the parameter that a config key names.
 
     Raises ConfigError if the key is not a number that a model uses.
@@ -146,15 +144,15 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
 _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerlab schema` lists every key."
 
 
-def parameter_keys(config: ContactConfig) -> Iterator[str]:
+def parameter_keys(config: reads.ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
     own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
-    written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
+    written = {SLOPE_RAD: SLOPE_DEG} if writer.slope_in_degrees(config.slope_rad) is not None else {}
     yield from (written.get(key, key) for key in own if not explain_non_parameter(key, config, own))
 
 
 def explain_non_parameter(
-    key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
+    key: str, config: reads.ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
     # `own` lists the keys that exist for this config's type of walker.

@@ -1,5 +1,7 @@
 """Build the parts of a walker (an assembly), which both models share, from the dimensions that its type has.
 
+It also finds the laws of ground and hinges that the config names, built-in ones and those of extensions.
+
 The frame of a body has its origin at a hinge (the knee for a shank, otherwise the hip). The y axis points up the body.
 "Ahead" is the walking direction while the leg is upright. Leg 1 swings first, leg 2 stands first. A positive angle puts
 the foot forward, so in a flexed knee the angle of the shank is smaller than that of the thigh.
@@ -9,9 +11,13 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from walkerlab.config import walkers
+from walkerlab.config.contact import Contact
 from walkerlab.config.drives import push_offs
 from walkerlab.config.reads import RigidConfig
 from walkerlab.errors import ConfigError
+from walkerlab.extensions import code_by_word, load
+from walkerlab.physics.kernels import LawKind
+from walkerlab.physics.mechanics.hinges import HINGE_LAWS
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 
 LEG_NAMES = ("leg 1", "leg 2")
@@ -190,3 +196,51 @@ def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
     """Whether the trailing knee is rigid during heel strike."""
     return not isinstance(walker, walkers.Kneed | walkers.AssembledWalker) or walker.knee.at_heel_strike == "locked"
+
+
+def hinge_law_of(walker: AnyWalker) -> Any:
+    return law_class(HINGE_LAWS, walker.hip.hinge_law)
+
+
+def law_class(kind: LawKind, word: str) -> Any:
+    """Return the class of the law that a config names.
+
+    Raises ConfigError if a law that an extension added is incomplete.
+    """
+    try:
+        law = kind.laws.get(word) or load(code_by_word(kind.key)[word])
+    # The code is another package's, which may raise anything.
+    except Exception as error:
+        raise ConfigError(
+            f"{kind.key}: the code of '{word}' cannot be imported: {type(error).__name__}: {error}.",
+            "`walkerlab extensions` shows which package adds it.",
+        ) from error
+    if missing := missing_members(law, kind):
+        named = f"the {kind.key.removesuffix('_law').replace('_', '-')} law {law.__name__} ('{word}')"
+        raise ConfigError(f"{named} is incomplete: it lacks {', '.join(missing)}.", where_to_look(kind))
+    return law
+
+
+def ground_law(kind: LawKind, contact: Contact) -> Any:
+    """Create the law that a contact block in SI names. Raises ConfigError as `law_class` does."""
+    law = law_class(kind, getattr(contact, kind.key))
+    try:
+        return law.from_contact(contact)
+    except (TypeError, AttributeError) as error:
+        raise ConfigError(f"{error}.", where_to_look(kind)) from error
+
+
+def where_to_look(kind: LawKind) -> str:
+    return f"{kind.protocol.__name__} in {kind.protocol.__module__} lists the members of a law."
+
+
+def missing_members(law: type, kind: LawKind) -> list[str]:
+    """List what the class of a law lacks: members of the protocol, and registered cases of functions."""
+    members = [name for name in vars(kind.protocol) if not name.startswith("_")]
+    missing = [name for name in members if not hasattr(law, name)]
+    if kind.derived and not issubclass(law, kind.protocol):
+        missing = [f"the base class {kind.protocol.__name__}"]
+    # A law with one of these functions needs the others, too. For example, counted events must also be sampled.
+    together = kind.together if any(law in function for function in kind.together) else ()
+    cases = [function for function in (*kind.required, *together) if law not in function]
+    return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]

@@ -1,7 +1,5 @@
 """Build the rigid model of a config, with only the parts that the config needs, and the heights of its footholds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,26 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkerlab.config.contact import Footholds
-from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import Walker
+from walkerlab.config import contact, reads, walkers
 from walkerlab.errors import ConfigError
-from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
-from walkerlab.physics.hybrid.walk_record import rough_heights
+from walkerlab.physics.hybrid import recorded_walk, walk_record
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
-from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
-from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene import parts
-from walkerlab.scene.laws import hinge_law_of
-from walkerlab.scene.studies import replace_equations
+from walkerlab.physics.solvers import registry, system
+from walkerlab.scene import parts, studies
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations, Output
 
 
-def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
+def foothold_heights(ground: contact.Footholds, steps: int) -> system.Floats | None:
     """Return the heights (steps + 1,) in m of the footholds above the slope, from the start on, or None on even
     ground."""
     if ground.even:
@@ -36,10 +28,10 @@ def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
     if ground.heights_m:
         listed = np.array(ground.heights_m)[:steps]
         return np.concatenate(([0.0], listed, np.full(steps - listed.size, ground.heights_m[-1])))
-    return rough_heights(ground.roughness_m, ground.seed, steps)
+    return walk_record.rough_heights(ground.roughness_m, ground.seed, steps)
 
 
-FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
+FIRST_STEP = registry.Tolerances("dop853", 1e-10, 1e-12, registry.ENDLESS)
 CACHED_LEVEL_WALKERS = 16  # number of walkers that are cached, since all members of a family over slopes share one
 
 
@@ -48,25 +40,25 @@ class RigidScene:
     walker: RigidModel
     names: tuple[str, ...]  # names of the state variables
     knees_m: tuple[Position, ...]  # position of each leg's knee in its thigh's frame; empty without knees
-    outputs: tuple[Output, ...]  # groups of quantities to record over time
-    ground: Footholds
+    outputs: "tuple[Output, ...]"  # groups of quantities to record over time
+    ground: contact.Footholds
 
     def walk(
         self,
-        start: State,
+        start: system.State,
         steps: int,
-        tolerances: Tolerances,
+        tolerances: registry.Tolerances,
         sampled: bool = False,
         advance: Callable[[int], None] | None = None,
         step_length: float | None = None,
-    ) -> RigidWalkResult:
+    ) -> recorded_walk.RigidWalkResult:
         """Simulate up to `steps` steps from a state (2 n). `sampled` records the requested outputs, see `take_walk`."""
         heights = foothold_heights(self.ground, steps)
         sampled = sampled and bool(self.outputs)
-        return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
+        return recorded_walk.take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 
-def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, ...]) -> RigidScene:
+def rigid_scene(config: reads.RigidConfig, ground: contact.Footholds, outputs: "tuple[Output, ...]") -> RigidScene:
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
@@ -76,14 +68,14 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     )
 
 
-def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
+def rigid_walker(config: reads.RigidConfig, equations: "Equations | None" = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
     level = level_walker(config.walker, config.gravity_m_s2)
     driven = add_drives(change_slope(level, config.slope_rad), config)
-    return replace_equations(driven, equations or config.equations)
+    return studies.replace_equations(driven, equations or config.equations)
 
 
-def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
+def add_drives(passive: RigidModel, config: reads.RigidConfig) -> RigidModel:
     """Return the model with the push-off, hip spring and knee dampers of the config."""
     drives = parts.drive_parameters(config)
     driven = passive.changed(**drives.shared)
@@ -98,12 +90,12 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
-def level_walker(walker: Walker, gravity: float) -> RigidModel:
+def level_walker(walker: walkers.Walker, gravity: float) -> RigidModel:
     """Return a walker on level ground (gravity in m/s^2).
 
     Raises ConfigError if the parts are not a valid walker.
     """
-    law = hinge_law_of(walker)
+    law = parts.hinge_law_of(walker)
     assembly = parts.assembly_of(walker, rigid=True)
     try:
         return rigid_on_level_ground(assembly, gravity, parts.knee_locked_at_strike(walker), law)
@@ -111,19 +103,19 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
         raise ConfigError(f"walker: {error}", parts.PARTS_DOCS) from None
 
 
-def have_different_legs(config: RigidConfig) -> bool:
+def have_different_legs(config: reads.RigidConfig) -> bool:
     return rigid_walker(config).legs_differ
 
 
-def state_names(config: RigidConfig) -> tuple[str, ...]:
+def state_names(config: reads.RigidConfig) -> tuple[str, ...]:
     angles = tuple(f"theta_{name}" for name in group_bodies(parts.assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
 
 
-def first_step_length(config: RigidConfig, start: State) -> float:
+def first_step_length(config: reads.RigidConfig, start: system.State) -> float:
     """Return the length (m) of the rigid model's first step from a state, or half a leg if it does not complete it.
 
     It is the reference length of a walk that starts in mid-step, because the feet are not a step apart then.
     """
-    first = take_walk(rigid_walker(config), FIRST_STEP, start, 1)
+    first = recorded_walk.take_walk(rigid_walker(config), FIRST_STEP, start, 1)
     return float(first.lengths_m[0]) if first.steps else 0.5 * config.walker.leg_length_m

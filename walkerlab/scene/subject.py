@@ -1,8 +1,6 @@
 """Prepare models and their gaits for disturbances and derivatives, and build step maps over a parameter for
 families."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -13,14 +11,12 @@ from walkerlab.config.reads import ContactConfig, RigidConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.physics.mechanics.rigid_model import RigidModel
-from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits import family_search, similarity
 from walkerlab.physics.orbits.gradients import Gradient, gradients
 from walkerlab.physics.orbits.rigid_map import RigidMap, coordinates_of
 from walkerlab.physics.orbits.robustness import GaitOnMap
-from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import StepMap, walk_steps
-from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
-from walkerlab.physics.solvers.system import Floats
+from walkerlab.physics.solvers import registry, system
 from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
 
@@ -29,7 +25,7 @@ if TYPE_CHECKING:
     from walkerlab.scene.contact import ContactScene
 
 # Solver settings of one step of the contact model.
-CONTACT_STEP = Tolerances("radau5", 1e-10, 1e-12, 60_000)
+CONTACT_STEP = registry.Tolerances("radau5", 1e-10, 1e-12, 60_000)
 RELATIVE_CHANGE = 1e-3  # relative change of a parameter with which to test whether a model depends on it
 
 
@@ -44,14 +40,14 @@ def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
     return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
 
 
-def scene_for(step_length_m: float) -> Callable[[ContactConfig], ContactScene]:
+def scene_for(step_length_m: float) -> "Callable[[ContactConfig], ContactScene]":
     """Return a function that builds the contact scene of a config, with pads and terrain for steps of this length."""
     from walkerlab.scene.contact import contact_scene
 
     return lambda config: contact_scene(config, step_length_m, step_length_m)
 
 
-def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
+def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> "ContactMap":
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(step_length_m)
@@ -102,8 +98,8 @@ def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError
 
 # Solver settings, with a budget per step, for walks whose steps are only counted.
 QUICK_WALKS: Final = {
-    RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
-    CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
+    family_search.RIGID: registry.Tolerances("dop853", 1e-7, 1e-9, registry.ENDLESS),
+    family_search.CONTACT: registry.Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
 }
 
 
@@ -113,14 +109,14 @@ class ModelUnderTest:
 
     model: str
     config: ContactConfig  # config of the model's scene
-    z: Floats  # (d,) coordinates of the gait on the section
+    z: system.Floats  # (d,) coordinates of the gait on the section
     length_m: float  # step length
 
     def gait_on_map(self, parameter: Parameter = SLOPE) -> GaitOnMap:
         p = parameter.value_in(self.config)
         step_map: StepMap = (
             rigid_map(self.config, parameter, 1.0)
-            if self.model == RIGID
+            if self.model == family_search.RIGID
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
@@ -139,19 +135,19 @@ class ModelUnderTest:
     def first_leg(self) -> int:
         """Leg (1 or 2) that swings in the first complete step from the gait's section."""
         # The contact model's section lies within the swing of leg 1, so in the first complete step leg 2 swings.
-        return 1 if self.model == RIGID else 2
+        return 1 if self.model == family_search.RIGID else 2
 
     @property
-    def units(self) -> Units:
-        return unit_walker(rigid_walker(self.config))[1]
+    def units(self) -> similarity.Units:
+        return similarity.unit_walker(rigid_walker(self.config))[1]
 
     def gradients(self, parameter: Parameter, selection: Collection[str]) -> dict[str, Gradient]:
         return gradients(self.gait_on_map(parameter), abs(parameter.value_in(self.config)) or 1e-2, selection)
 
 
-def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
+def section_coordinates(walker: RigidModel, state: Sequence[float]) -> system.Floats:
     """Return the section coordinates of the unit walker for a state (SI)."""
-    _, units = unit_walker(walker)
+    _, units = similarity.unit_walker(walker)
     z = coordinates_of(walker, state)
     z[1:] *= units.time
     return z
@@ -168,9 +164,9 @@ def find_model_gait(
     Raises NoAnswer if the model has no gait.
     """
     length = float(gait["step_length_m"])
-    if model == RIGID:
+    if model == family_search.RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])
-        return ModelUnderTest(RIGID, config, z, length)
+        return ModelUnderTest(family_search.RIGID, config, z, length)
     # Imported here, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
@@ -184,4 +180,4 @@ def find_model_gait(
         note("the contact model walks on after-mid-swing ground, because pads would end disturbed walks")
     length = float(answer.gait.lengths_m.mean())
     z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
-    return ModelUnderTest(CONTACT, config, z, length)
+    return ModelUnderTest(family_search.CONTACT, config, z, length)

@@ -1,7 +1,5 @@
 """Render texts from Jinja templates, which have a file for each subject and a macro for each paragraph."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,7 +39,7 @@ class Prose:
     known: Mapping[str, Any]  # global variables of the templates
 
     @cached_property
-    def templates(self) -> Environment:
+    def templates(self) -> "Environment":
         # Imported here, because commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

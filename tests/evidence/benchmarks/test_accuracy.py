@@ -61,7 +61,7 @@ def test_two_methods_agree_on_the_reference_to_rounding(reference):
     assert reference.agreement < 1e-13
 
 
-def test_reference_without_taylor_series_also_has_two_methods():
+def test_reference_without_taylor_series_is_also_computed_by_two_methods():
     """Neither of them is the Taylor method, whose closed form is for a compass only."""
     reference = reference_for(replace(TRIAL, compass=None, steps=1))
     assert {reference.first.method, reference.second.method} == {"dop853", "radau5"}

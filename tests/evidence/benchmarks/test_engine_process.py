@@ -17,7 +17,7 @@ def own():
         yield one
 
 
-def test_engine_results_are_returned_without_its_printed_output(own, capfd):
+def test_results_of_an_engine_do_not_contain_its_printed_output(own, capfd):
     assert [own.do(Answers(number).run, 30.0) for number in (1, 2)] == [1, 2]
     assert "engines talk" not in capfd.readouterr().out
 

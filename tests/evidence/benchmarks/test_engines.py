@@ -172,6 +172,6 @@ def test_start_with_scaled_velocities_has_the_same_angles():
     assert slower.start[4:] == pytest.approx([0.95 * x for x in scene.start[4:]])
 
 
-def test_closest_contact_is_chosen_without_rows_of_scaled_starts():
+def test_rows_of_scaled_starts_do_not_count_for_the_closest_contact():
     other = row("drake", "lagged", "own-law", 2.5e-4, 1e-9, 1.0, 0.711, start=0.95)
     assert closest([*ROWS, other])["period_error_s"] == pytest.approx(6e-4)

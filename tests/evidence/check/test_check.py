@@ -15,7 +15,7 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.check.answer import check_gait
 from walkerlab.evidence.check.gaits import gait_near
-from walkerlab.evidence.check.plain_walker import plain_walker, take_step
+from walkerlab.evidence.check.plain_walker import energy, plain_walker, take_step
 from walkerlab.evidence.check.printed import Item, equal_digits
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
@@ -113,7 +113,7 @@ def test_energy_is_constant_within_a_plain_swing():
     start = np.array(find_gaits(rigid_walker(load(Path("round-feet")).config), 0).gait.state)
     start[:2] += walker.slope
     step = take_step(walker, start)
-    assert walker.energy(step.before) == pytest.approx(walker.energy(start), abs=1e-11)
+    assert energy(walker, step.before) == pytest.approx(energy(walker, start), abs=1e-11)
 
 
 def test_digits_are_counted_as_typed_with_or_without_quotes(tmp_path):
@@ -334,7 +334,7 @@ def test_answer_says_which_values_a_cause_explains_and_how_far_off_others_are():
     assert "After one exact step it has changed by 0.0045 (angles in rad, rates times sqrt(L/g)), 45 units" in words
 
 
-def test_state_is_typed_on_the_command_line():
+def test_state_can_be_given_on_the_command_line():
     done = run("-c", "paper", "--state", "[-0.2042, 0.1694; -0.6058 -0.8610]")
     assert done.exit_code == 0
     assert "Right: 4 printed values reproduced to the last digit." in done.output

@@ -70,7 +70,7 @@ def test_right_gait_is_reproduced_without_an_explanation(digits):
 
 
 @pytest.mark.parametrize(("name", "digits"), [("leak", 4), ("drag", 10), ("spring", 6), ("bounce", 4)])
-def test_mistake_that_is_on_no_list_stays_unexplained(walker, name, digits):
+def test_mistake_that_the_check_does_not_know_stays_unexplained(walker, name, digits):
     legs, state = walker
     found = gait_with(legs, state, {name: UNLISTED[name]})
     answer = answer_to(config_of(legs), *found, digits)

@@ -58,7 +58,7 @@ def test_printed_coriolis_matrix_with_the_foot_released_has_the_same_wrong_sign(
     assert same(wrong[1, 0], 2 * term)
 
 
-def test_printed_foot_position_is_wrong_in_its_height():
+def test_printed_foot_position_has_a_wrong_height():
     wrong = paper.differing(paper.PRINTED_FOOT, paper.swing_foot(sp.Matrix([paper.x, paper.y])))
     assert list(wrong) == [(1, 0)]
     assert same(wrong[1, 0], 2 * paper.L * (sp.cos(paper.theta_1) - sp.cos(paper.theta_2)))

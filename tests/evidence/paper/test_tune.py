@@ -44,7 +44,7 @@ def test_contact_of_the_paper_needs_no_adjustment():
     assert margins["dtheta_2 down"]["beyond"] == "off-pad"
 
 
-def test_contact_gait_is_the_one_that_the_walk_settles_on():
+def test_contact_walk_settles_on_the_contact_gait():
     summary = small("paper").summary
     gait, walk = summary["gait"], summary["procedure"]["adjusted"]
     assert gait["stable"]

@@ -123,7 +123,7 @@ def test_twin_of_a_walker_scales_hinge_parameters_by_the_units_of_their_law(monk
     law = {"hip": walker.hip.model_copy(update={"hinge_law": "quadratic"})}
     config = config.config.model_copy(update={"walker": walker.model_copy(update=law)})
     by = to_twin(config)
-    twin = scaled(config, by)
+    twin = scale_config(config, by)
     assert twin.walker.knee.stop_damping == pytest.approx(walker.knee.stop_damping * by.energy * by.time)
     own, twins = (unit_walker(rigid_walker(each))[0] for each in (config, twin))
     assert np.count_nonzero(own["laws"]) == 2

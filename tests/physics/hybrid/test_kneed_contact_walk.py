@@ -190,7 +190,7 @@ def test_scaled_copy_of_a_kneed_walker_takes_the_same_steps():
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
 
 
-def test_one_compiled_walk_serves_straight_legs_knees_and_a_pinned_step():
+def test_straight_legs_knees_and_a_pinned_step_share_one_compiled_walk():
     contact_walks.walked(steps=1)
     compiled = set(walk_in_form.signatures)
     contact_walks.walked("contact.stance=pinned", steps=1)
@@ -233,7 +233,7 @@ def test_knee_stop_converges_to_the_ideal_lock_with_the_root_of_stiffness():
         assert orders == pytest.approx([0.5, 0.5], abs=0.05)
 
 
-def test_kneed_contact_gait_is_the_one_that_a_long_walk_settles_on():
+def test_long_kneed_walk_settles_on_the_contact_gait():
     scene, walk = scene_of(), walked(steps=40, tolerance=1e-9)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     answer = find_gait_from(scene.walker, scene.ground, settings(1e-10), start)

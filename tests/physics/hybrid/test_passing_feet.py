@@ -75,7 +75,7 @@ def test_rising_foot_on_the_surface_counts_as_above_it(carried, height, taken_fo
 
 @pytest.mark.parametrize("height", [AIR, SURFACE, GROUND])
 @pytest.mark.parametrize("forward", [FORWARD, BACK])
-def test_order_of_the_feet_does_not_matter_on_pads_and_ordinary_ground(forward, height):
+def test_passing_does_not_change_the_support_on_pads_and_ordinary_ground(forward, height):
     for carried in (False, True):
         assert Feet("checkerboard", height).passing(forward, carried).carried == carried
     assert Feet("plane", height).passing(forward, carried=True).carried

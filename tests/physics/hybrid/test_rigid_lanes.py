@@ -104,7 +104,7 @@ def test_walk_does_not_depend_on_the_other_lanes():
     assert (strikes.after[0] == strikes.after[2]).all()
 
 
-def test_walker_standing_still_never_strikes():
+def test_walker_that_stands_still_has_no_heel_strike():
     shallow = ONE_DEGREE._replace(slope=0.0)
     fates, _ = in_lanes(shallow, on_slope(shallow, (0.0, 0.0, 0.0)))
     assert Outcome(int(fates.outcome[0])) is Outcome.NO_HEEL_STRIKE

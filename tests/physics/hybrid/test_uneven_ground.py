@@ -212,7 +212,7 @@ def test_foot_below_its_next_foothold_at_mid_swing_stubs_on_plain_ground():
     assert (walk.outcome, walk.steps) == (Outcome.STUBBED, 1)
 
 
-def test_hitting_the_side_of_a_raised_pad_is_off_pad():
+def test_hitting_the_side_of_a_raised_pad_counts_as_off_pad():
     _, walk = on_terrain("slope-3deg", "checkerboard", np.array([0.0, 0.0, 0.2]))
     assert walk.outcome in (Outcome.OFF_PAD, Outcome.FELL)
     assert walk.steps == 1

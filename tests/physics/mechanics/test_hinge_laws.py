@@ -72,6 +72,6 @@ def test_similar_walker_of_unit_size_has_similar_torques():
     assert rates(unit, STRAIGHT, scaled) == pytest.approx(accelerations * units.time**2, rel=1e-12)
 
 
-def test_only_linear_hips_walk_in_lanes():
+def test_only_linear_hip_laws_are_simulated_in_lanes():
     assert two_legs(walker()) is None
     assert two_legs(walker(law=SpringDamper)) is not None

@@ -67,7 +67,7 @@ def test_gait_of_a_published_walker_is_reproduced(name):
         assert np.abs(eigenvalues - wanted).min() < 1e-5
 
 
-def test_knee_strikes_at_the_published_time():
+def test_knee_strike_comes_at_the_published_time():
     parts, slope, gravity, (angle, stance, swing), *_ = PUBLISHED["kneed"]
     model = rigid_on_slope(parts, gravity, slope)
     z, _ = solved(model, np.array([angle - slope, swing, stance]))

@@ -54,7 +54,8 @@ def test_series_that_does_not_converge_has_no_limit():
 
 def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
     made = distances([0.7 + 0.01 * 2.0**-i for i in range(6)], 2.0)
-    rounded = [replace(made[-1], period=made[-1].period + noise, numerical_period=1e-6) for noise in (3e-7, -5e-7)]
+    last = made[-1]
+    rounded = [replace(last, period_s=last.period_s + noise, numerical_period_s=1e-6) for noise in (3e-7, -5e-7)]
     assert extrapolate([*made, *rounded]) == extrapolate(made)
 
 

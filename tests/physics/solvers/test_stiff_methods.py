@@ -51,7 +51,7 @@ def error_of(name, problem, tolerance):
     return np.abs(method.y[: len(end)] / end - 1.0).max(), int(method.counts[ACCEPTED])
 
 
-def test_there_are_stiff_methods_of_more_than_one_library():
+def test_stiff_methods_come_from_more_than_one_library():
     assert {"radau5", "scipy-lsoda", "scipy-radau", "scipy-bdf"} <= set(STIFF_METHODS)
 
 

@@ -63,7 +63,7 @@ def test_values_are_in_the_unit_of_the_requested_key(in_degrees):
     assert first == pytest.approx(math.degrees(in_radians), abs=1e-9)
 
 
-def test_gait_without_neighbours_is_reported_but_is_no_branch():
+def test_gait_without_neighbours_is_reported_but_not_as_a_branch():
     sets = {"over": "walker.hip.spring_N_m_per_rad", "from": 0, "to": 40, "periods": 1}
     asked = load(Path("level"), [f"continuation.{key}={value}" for key, value in sets.items()]).config
     summary = continuation.run(restrict(asked, PIPELINE["continuation"].takes), {}, Silent(), again=False).summary

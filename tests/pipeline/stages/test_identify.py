@@ -477,7 +477,7 @@ def test_exhausted_fit_budget_gives_no_answer_but_keeps_the_best_fit(table, gait
     assert caught.value.partial.summary["models"][0]["fit"] == "not-converged"
 
 
-def test_doubts_are_listed_and_the_estimates_still_used(table, gait):
+def test_estimates_with_doubts_are_used_and_the_doubts_listed(table, gait):
     changes = ask(table, "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}")
     summary = identify.run(taken(*changes), gait, Silent()).summary
     assert summary["models"][0]["fit"] == "fits-but"

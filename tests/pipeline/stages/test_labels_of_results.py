@@ -16,7 +16,7 @@ LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.KNEE_LABELS,
     "walk": walk.TIME_LABELS | walk.STEP_LABELS,
-    "limit": tune.FACTOR_LABELS | tune.DISTANCE_LABELS | tune.WALK_LABELS,
+    "limit": tune.FACTOR_LABELS | tune.DISTANCE_LABELS,
 }
 
 

@@ -81,7 +81,7 @@ def test_walk_is_read_despite_noise_gaps_offsets_and_swapped_legs(tmp_path):
 
 
 @pytest.mark.parametrize("delay", [100.0, 1.7e9])
-def test_first_time_of_a_recording_does_not_matter(tmp_path, delay):
+def test_walk_does_not_depend_on_the_first_time_of_the_recording(tmp_path, delay):
     """The clock of a camera may count from when it was switched on, or from 1970."""
     lines = table(simulated("rigid"), every=4).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]

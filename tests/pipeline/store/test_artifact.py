@@ -207,7 +207,7 @@ def test_digest_is_the_same_in_another_process(content):
     assert done.stdout.strip() == content.digest(), done.stderr
 
 
-def test_check_accepts_the_right_key_only(tmp_path, content, identity, origin):
+def test_check_accepts_only_the_right_key(tmp_path, content, identity, origin):
     path = tmp_path / "a.h5"
     assert artifact.check(path, identity.key).reason == "not there yet"
     artifact.write(path, content, identity, origin)

@@ -283,7 +283,7 @@ def test_damaged_result_is_reported_with_the_command_to_recompute_it(run, reader
     assert refused.value.exit_code == 5
 
 
-def test_damaged_results_that_are_not_needed_do_not_matter(run):
+def test_damaged_results_that_are_not_needed_are_ignored(run):
     run.artifact("simulate").write_bytes(b"")
     assert export_from(run, "trajectory", Target("csv", None), "contact-sim", QUIET).is_file()
 

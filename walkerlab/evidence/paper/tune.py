@@ -86,30 +86,23 @@ GAIT_SERIES = STICTION_SERIES, NORMAL_SERIES
 COARSE_STRIDE = 3  # use every third setting for walkers that are slower to simulate than the compass
 SETTING = "setting"
 FACTOR_LABELS = {
-    "stiffness": Label("1", "factor applied to the stiffness", name="stiffness_factor"),
-    "damping": Label("1", "factor applied to the damping", name="damping_factor"),
-    "stiction": Label("1", "factor applied to the stiction and friction velocity", name="stiction_velocity_factor"),
+    "stiffness_factor": Label("1", "factor applied to the stiffness"),
+    "damping_factor": Label("1", "factor applied to the damping"),
+    "stiction_velocity_factor": Label("1", "factor applied to the stiction and friction velocity"),
 }
 DISTANCE_LABELS = {
-    "period": Label("s", "period of the contact gait", name="period_s"),
-    "length": Label("m", "step length of the contact gait", name="step_length_m"),
-    "slip": Label("m", "slip per step of the contact gait", name="slip_m"),
-    "period_error": Label("s", "period of the contact gait minus the rigid gait's", name="period_error_s"),
-    "length_error": Label("m", "step length of the contact gait minus the rigid gait's", name="length_error_m"),
-    "numerical_period": Label("s", "change of the period at a ten times tighter tolerance", name="numerical_period_s"),
-}
-PHASE_TEXT = "in phase, between impacts"
-WALK_LABELS = {
-    "angle": Label("rad", f"largest difference of an angle from the rigid walk {PHASE_TEXT}", name="angle_error_rad"),
-    "velocity": Label("rad/s", f"largest difference of an angular velocity {PHASE_TEXT}", name="velocity_error_rad_s"),
-    "raw_angle": Label("rad", "largest difference of an angle at the same time", name="raw_angle_error_rad"),
-    "raw_velocity": Label(
-        "rad/s", "largest difference of an angular velocity at the same time", name="raw_velocity_error_rad_s"
-    ),
-    "numerical_time": Label(
-        "s", "change of the last touch's time if the tolerance is a hundred times tighter", name="numerical_time_s"
-    ),
-    "evaluations": Label("1", "number of right-hand-side evaluations in the walk", name="rhs_evaluations"),
+    "period_s": Label("s", "period of the contact gait"),
+    "step_length_m": Label("m", "step length of the contact gait"),
+    "slip_m": Label("m", "slip per step of the contact gait"),
+    "period_error_s": Label("s", "period of the contact gait minus the rigid gait's"),
+    "length_error_m": Label("m", "step length of the contact gait minus the rigid gait's"),
+    "numerical_period_s": Label("s", "change of the period at a ten times tighter tolerance"),
+    "angle_error_rad": Label("rad", "largest difference of an angle from the rigid walk in phase, between impacts"),
+    "velocity_error_rad_s": Label("rad/s", "largest difference of an angular velocity in phase, between impacts"),
+    "raw_angle_error_rad": Label("rad", "largest difference of an angle at the same time"),
+    "raw_velocity_error_rad_s": Label("rad/s", "largest difference of an angular velocity at the same time"),
+    "numerical_time_s": Label("s", "change of the last touch's time if the tolerance is a hundred times tighter"),
+    "rhs_evaluations": Label("1", "number of right-hand-side evaluations in the walk"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
 }
 
@@ -177,8 +170,9 @@ def limit_summary(findings: LimitFindings) -> dict[str, Any]:
     """Summarise the orders of convergence, the settings that reach the paper's 1e-4 rad, and why the periods differ."""
     reaches = {}
     for name in findings.walk_series:
-        distances = [distance for distance in findings.series[name] if distance.angle is not None]
-        first = next((distance for distance in distances if (distance.angle or 0.0) <= LARGEST_ERROR.value), None)
+        distances = [distance for distance in findings.series[name] if distance.angle_error_rad is not None]
+        within = (distance for distance in distances if (distance.angle_error_rad or 0.0) <= LARGEST_ERROR.value)
+        first = next(within, None)
         reaches[name] = {
             "claim_rad": LARGEST_ERROR.value,
             "settings": [setting(distance) for distance in distances],
@@ -189,11 +183,10 @@ def limit_summary(findings: LimitFindings) -> dict[str, Any]:
 
 
 def setting(distance: Distance) -> dict[str, Any]:
-    differences = ("period_error", "angle", "velocity", "raw_angle", "numerical_time")
-    labels = {name: (DISTANCE_LABELS | WALK_LABELS)[name] for name in differences}
+    names = ("period_error_s", "angle_error_rad", "velocity_error_rad_s", "raw_angle_error_rad", "numerical_time_s")
     return {
         **values_by_column(distance.setting, FACTOR_LABELS),
-        **values_by_column(distance, labels),
+        **{name: getattr(distance, name) for name in names},
         "run_wall_s": distance.wall_s,
     }
 
@@ -209,31 +202,30 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
     if findings.without_creep is not None:
         parts["creep_s"] = findings.contact_period - findings.without_creep.period
     if findings.series[NORMAL_SERIES]:
-        parts["penetration_and_finite_impact_s"] = findings.contact_period - findings.series[NORMAL_SERIES][-1].period
+        parts["penetration_and_finite_impact_s"] = findings.contact_period - findings.series[NORMAL_SERIES][-1].period_s
     if findings.series.get(ALL_POINT_SERIES):
-        parts["foot_radius_s"] = findings.contact_period - findings.series[ALL_POINT_SERIES][0].period
+        parts["foot_radius_s"] = findings.contact_period - findings.series[ALL_POINT_SERIES][0].period_s
     parts["rest_s" if findings.without_creep is None else "together_s"] = total - sum(parts.values())
     return {
         "total_s": total,
         **parts,
         "creep_uncertainty_s": None if findings.without_creep is None else findings.without_creep.uncertainty,
-        "left_with_all_off_s": farthest[-1].period_error if farthest else None,
+        "left_with_all_off_s": farthest[-1].period_error_s if farthest else None,
     }
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
     """Build a group for each series: its settings, and how far gait and, if compared, walk are from the rigid ones."""
     groups = {}
-    for name, rows in findings.series.items():
-        complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]
-        if rows:
-            of = [distance.setting for distance in complete or rows]
-            settings = rows_group(
-                of, FACTOR_LABELS, SETTING, "number of the setting, beginning with the config's contact"
-            )
-            distances = columns(complete or rows, DISTANCE_LABELS | (WALK_LABELS if complete else {}), SETTING)
-            path = f"limit/{name.replace(', ', '-').replace(' ', '-')}"
-            groups[path] = Group({**settings.variables, **distances})
+    text = "number of the setting, beginning with the config's contact"
+    for series, rows in findings.series.items():
+        shown = [distance for distance in rows if distance.angle_error_rad is not None] or rows
+        if shown:
+            settings = rows_group([row.setting for row in shown], FACTOR_LABELS, SETTING, text)
+            # Without a compared walk, its columns are missing.
+            labels = {name: DISTANCE_LABELS[name] for name in DISTANCE_LABELS if getattr(shown[0], name) is not None}
+            path = f"limit/{series.replace(', ', '-').replace(' ', '-')}"
+            groups[path] = Group({**settings.variables, **columns(shown, labels, SETTING)})
     return groups
 
 

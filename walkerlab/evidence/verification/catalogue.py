@@ -22,7 +22,7 @@ from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError
 from walkerlab.physics.orbits.similarity import Units
-from walkerlab.scene.laws import hinge_law_of
+from walkerlab.scene.parts import hinge_law_of
 
 CATALOGUE: Final = Path(__file__).parent / "catalogue.yaml"
 UNIQUE_NAME_ADVICE: Final = "Give each case a unique name."

@@ -305,9 +305,10 @@ def compute_pseudo_residuals(residuals: Floats, quantity: NDArray[np.int64], rob
     """Return pseudo-residuals (values,), with which least squares gives the same result as the soft_l1 loss with the
     residuals.
 
-    With the loss's derivative psi(x) = x / sqrt(1 + x^2) of residuals in units of their scatter, least squares on
-    psi / mean(psi') has the fixed point and the covariance of the robust fit; another factor corrects for short walks.
-    So its noise, times the square root of the loss's efficiency, is the scatter of values without outliers.
+    The derivative of the loss is psi(x) = x / sqrt(1 + x^2), where x are residuals in units of their scatter. Least
+    squares on psi / mean(psi') has the fixed point and the covariance of the robust fit. Another factor corrects for
+    short walks. The noise of this fit, times the square root of the efficiency of the loss, is the scatter of values
+    without outliers.
 
     Source: Huber, Robust Statistics, Wiley (1981), sections 7.4 to 7.8.
     """

@@ -27,7 +27,7 @@ NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference for which the answe
 PHASE_BINS: Final = 20
 # fraction of the leg length; the floor of a laboratory has about 0.001
 UNUSUALLY_ROUGH: Final = 0.003
-UNUSUAL_KICK: Final = 0.05  # fraction of the rates
+UNUSUAL_KICK: Final = 0.05  # change of the rates at a heel strike that is unusual, as a fraction of the rates
 # Largest acceptable scatter of averaged residuals, as a normal deviate. Of the walks that the model explains, 0.8 %
 # exceed it.
 MAX_DEPENDENCE: Final = 2.4
@@ -178,7 +178,7 @@ def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     The map is fitted by least squares, as in the literature, so noise biases it.
 
     steps   (..., steps, quantities)
-    stride  number of steps after which a gait repeats, each with its own mean
+    stride  number of steps after which a gait repeats; each of these steps has its own mean
     """
     before, after = steps[..., :-1, :].copy(), steps[..., 1:, :].copy()
     for each in (before, after):

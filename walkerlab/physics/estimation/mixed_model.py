@@ -71,7 +71,7 @@ class Noise(NamedTuple):
 class Linearised:
     """Measured minus predicted values of a walk, and derivatives of the predicted values."""
 
-    residuals: Floats  # (values,) relative to the walk over even ground without kicks
+    residuals: Floats  # (values,) differences from the walk over even ground without kicks
     J: Floats  # (values, unknowns) derivatives with respect to the scaled unknowns
     G: Floats  # (values, heights + kicks) derivatives with respect to the heights, 1/m, and to kicks
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
@@ -103,7 +103,7 @@ class Reduced(NamedTuple):
 
     fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
     G: Floats  # (rows, heights + kicks)
-    covariance: Floats  # (2, rows, rows) covariance of the rows due to heights, and due to kicks, of unit variance
+    covariance: Floats  # (2, rows, rows) covariances of the rows that heights, and kicks, of unit variance would cause
     quantity: NDArray[np.int64]  # (rows,)
     counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)
@@ -116,7 +116,7 @@ class Reduced(NamedTuple):
         return int(self.fixed.shape[1]) - 1
 
     def disturbance_sets(self) -> tuple[tuple[int, ...], ...]:
-        """Return the possible disturbances, the simplest first: none, heights (0), kicks (1), or both."""
+        """Return the possible disturbances, beginning with the simplest: none, heights (0), kicks (1), or both."""
         return ((), (0,), (1,), (0, 1)) if self.kicks else ((), (0,))
 
 
@@ -233,13 +233,11 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return the unknowns' covariance and step to their most likely values, the sum of squares there, and a
-    log-determinant.
+    """Return covariance and most likely change of the unknowns, the sum of squares after it, and a log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
-    The last value is the logarithm of the information's determinant, from those eigenvalues that exceed rounding
-    errors.
+    The last value is the logarithm of the determinant of the information, from eigenvalues that exceed rounding errors.
     """
     score = reduced[..., 1:, 0]
     values, vectors = np.linalg.eigh(reduced[..., 1:, 1:])
@@ -266,10 +264,10 @@ def estimate_noise(
 ) -> tuple[Noise, tuple[Noise, ...]]:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are the simpler
-    explanation, so more of them must raise the likelihood.
+    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are a simpler
+    explanation, so more of them count only if they raise the likelihood.
 
-    earlier  likeliest noises of nearly the same rows, from which the searches start if they are likelier than others
+    earlier  likeliest noises for nearly the same rows; searches start from them if they are likelier than other starts
     """
     best = start
     best_likelihood = -math.inf
@@ -336,7 +334,7 @@ def climb(
 def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) -> Noise:
     """Return the standard deviations from their logarithms (..., quantities + sources). Other disturbances are zero.
 
-    leg_length_m  unit of the heights' deviation (m)
+    leg_length_m  unit (m) of the standard deviation of the heights
     """
     deviations = np.exp(logs)
     count = logs.shape[-1] - len(sources)

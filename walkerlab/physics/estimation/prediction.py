@@ -26,11 +26,11 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     GAIN: (1.0, 0.1),
     DELAY: (0.0, 0.05),
 }
-"""Properties of clock and sensors that can be estimated, each with the value if it is not, and a typical change."""
+"""Properties of clock and sensors that can be estimated: the value if a property is not, and a typical change."""
 # Directions of the start are dropped if changes along them have a smaller relative effect on the next step than this.
 MIN_EFFECT: Final = 1e-3
 LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as later than the last heel strike.
-START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
+START_SCALE: Final = 0.02  # typical change of each section coordinate of the start
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
@@ -127,7 +127,7 @@ class Readings:
         return np.unique(2 * half[:, None] + [0, 1], return_inverse=True)[1].ravel()
 
     def sensors(self, u: Floats) -> dict[str, float]:
-        """Return the properties of clock and sensors at unknowns u, of which the last are the nuisances."""
+        """Return the properties of clock and sensors for the unknowns u, which end with the nuisances."""
         estimated = dict(zip(self.nuisances, u[u.size - len(self.nuisances) :], strict=True))
         return {name: value + estimated.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
@@ -154,7 +154,7 @@ class Readings:
         return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
     def measured_times(self) -> Floats:
-        """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
+        """Return the sample times (samples,) from the first measured heel strike, by the clock of the measurement."""
         touches = np.append(0.0, np.cumsum(self.measured.periods_s))
         step = self.measured.step
         return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])

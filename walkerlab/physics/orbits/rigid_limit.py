@@ -42,9 +42,9 @@ PUSH_OFF_FACTOR = 0.1
 class ContactFactors(NamedTuple):
     series: str
     rigidity: float  # 1 for the config's contact, rising towards the limit
-    stiffness: float
-    damping: float
-    stiction: float
+    stiffness_factor: float
+    damping_factor: float
+    stiction_velocity_factor: float
 
 
 ALL_SERIES = "all"
@@ -81,7 +81,7 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
         return changed
     static = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass).depth
     # The duration is inversely proportional to the square root of the stiffness, but at most the config's.
-    brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
+    brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness_factor))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
 
@@ -89,23 +89,23 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
 class Distance:
     """How far gait and walk at one contact setting are from the rigid ones, with numerical errors."""
 
-    # `angle` and the fields after it describe the walk. They are None if no walk is compared.
+    # `angle_error_rad` and the fields after it describe the walk. They are None if no walk is compared.
 
     setting: ContactFactors
-    period: float  # s
-    length: float  # m
-    slip: float  # m
-    period_error: float  # s, difference from the rigid gait
-    length_error: float  # m, difference from the rigid gait
-    numerical_period: float  # s, change of the period when the tolerance is ten times tighter
-    angle: float | None = None  # rad, maximum difference between impacts, at equal phase
-    velocity: float | None = None  # rad/s, maximum difference between impacts, at equal phase
-    raw_angle: float | None = None  # rad, maximum difference at equal time
-    raw_velocity: float | None = None  # rad/s, maximum difference at equal time
-    # s, change of the last touchdown's time when the tolerance is a hundred times tighter
-    numerical_time: float | None = None
-    evaluations: int | None = None
-    wall_s: float | None = None  # s, processor time of the walk, minimum of several
+    period_s: float
+    step_length_m: float
+    slip_m: float
+    period_error_s: float  # difference from the rigid gait
+    length_error_m: float  # difference from the rigid gait
+    numerical_period_s: float  # change of the period when the tolerance is ten times tighter
+    angle_error_rad: float | None = None  # maximum difference between impacts, at equal phase
+    velocity_error_rad_s: float | None = None  # maximum difference between impacts, at equal phase
+    raw_angle_error_rad: float | None = None  # maximum difference at equal time
+    raw_velocity_error_rad_s: float | None = None  # maximum difference at equal time
+    # change of the last touchdown's time when the tolerance is a hundred times tighter
+    numerical_time_s: float | None = None
+    rhs_evaluations: int | None = None
+    wall_s: float | None = None  # processor time of the walk, minimum of several
 
 
 @dataclass(frozen=True)
@@ -179,12 +179,12 @@ class Limit:
         _, raw = comparison.difference_in_time(motion, self.motion)
         return replace(
             distance,
-            angle=float(np.abs(aligned.angle[smooth]).max()),
-            velocity=float(np.abs(aligned.velocity[smooth]).max()),
-            raw_angle=max(raw.largest("angle")),
-            raw_velocity=max(raw.largest("velocity")),
-            numerical_time=float(abs(sampled.touch_time_s[-1] - check.touch_time_s[-1])),
-            evaluations=int(sampled.work[0]),
+            angle_error_rad=float(np.abs(aligned.angle[smooth]).max()),
+            velocity_error_rad_s=float(np.abs(aligned.velocity[smooth]).max()),
+            raw_angle_error_rad=max(raw.largest("angle")),
+            raw_velocity_error_rad_s=max(raw.largest("velocity")),
+            numerical_time_s=float(abs(sampled.touch_time_s[-1] - check.touch_time_s[-1])),
+            rhs_evaluations=int(sampled.work[0]),
             wall_s=min(times),
         )
 
@@ -208,7 +208,7 @@ def observed_orders(distances: list[Distance]) -> list[float]:
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
-    changes = np.abs(np.diff([distance.period for distance in distances]))
+    changes = np.abs(np.diff([distance.period_s for distance in distances]))
     changes = np.maximum(changes, np.finfo(float).tiny)
     orders: list[float] = (np.log(changes[:-1] / changes[1:]) / math.log(ratio)).tolist()
     return orders
@@ -228,8 +228,8 @@ def extrapolate(distances: list[Distance]) -> Extrapolation | None:
     Returns None if the periods do not converge.
     """
     # Once the period changes by less than its numerical error, all further changes are only noise.
-    periods = np.array([distance.period for distance in distances])
-    errors = np.array([distance.numerical_period for distance in distances])
+    periods = np.array([distance.period_s for distance in distances])
+    errors = np.array([distance.numerical_period_s for distance in distances])
     unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])
     periods = periods[: unresolved[0] + 1] if unresolved.size else periods
     if periods.size < 4:

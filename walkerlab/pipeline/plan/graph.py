@@ -1,8 +1,6 @@
 """Graphs of stages, and the pipeline, which has the stages of all extensions: drawings come late, and the report
 last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -45,7 +43,7 @@ class Graph:
     def names(self) -> tuple[str, ...]:
         return tuple(self._by_name)
 
-    def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
+    def needed_for(self, target: str, config: "Config") -> tuple[Stage, ...]:
         """Return the target and all stages that it needs under a config, in running order."""
         needed = {target}
         for stage in reversed(self.stages):
@@ -53,7 +51,7 @@ class Graph:
                 needed.update(stage.inputs(config))
         return tuple(stage for stage in self.stages if stage.name in needed)
 
-    def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
+    def needed_in_memory(self, target: str, config: "Config") -> tuple[Stage, ...]:
         """Return the stages as `needed_for` does.
 
         Raises ConfigError if one of them lacks a config block or draws files.
@@ -85,7 +83,7 @@ def complete(drawing: Stage) -> Stage:
     needed = tuple(stage for stage in STAGES if drawing.name in stage.needed_by)
     shown_names = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
 
-    def inputs(config: Config) -> tuple[str, ...]:
+    def inputs(config: "Config") -> tuple[str, ...]:
         needed_names = (
             stage.name for stage in needed if stage.name not in stage.requires or getattr(config, stage.name)
         )

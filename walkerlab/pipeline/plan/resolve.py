@@ -5,12 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config import files
-from walkerlab.config.loader import LoadedConfig, key_of, load
-from walkerlab.config.problems import problem_error
-from walkerlab.config.reads import flatten
-from walkerlab.config.schema import Config
-from walkerlab.config.walkers import AssembledWalker
+from walkerlab.config import files, loader, problems, reads, schema, walkers
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
@@ -26,7 +21,7 @@ BUILTIN = "built-in "
 class ResolvedRun:
     """A loaded config and its run folder."""
 
-    loaded: LoadedConfig
+    loaded: loader.LoadedConfig
     folder: RunFolder
     extends: str  # config that a new one, written from this run's results, extends: a file or a built-in name
 
@@ -54,11 +49,11 @@ def resolve(
         run = artifact_at(path) or run_at(str(text), runs)
     if run is not None:
         folder, earlier = run
-        read = load(earlier, sets, strides, name)
+        read = loader.load(earlier, sets, strides, name)
         runs = folder.runs_dir
         source = folder.source
     else:
-        read = load(path, sets, strides, name)
+        read = loader.load(path, sets, strides, name)
         source = source_of(path, runs)
     refuse_invalid_parts(read)
     for stage in PIPELINE.stages:
@@ -71,7 +66,7 @@ def resolve(
     return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), files.config_to_extend(text))
 
 
-def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
+def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str]]:
     """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
 
     Keys that were set when the run was made are not compared.
@@ -85,14 +80,14 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
     if not files.is_file(path):
         return file.label, ["it is no longer there"]
     try:
-        edited = load(file).config
+        edited = loader.load(file).config
     except ConfigError:
         return file.label, ["it is no longer valid"]
-    changed_keys = {key_of(change) for change in folder.changes}
+    changed_keys = {loader.key_of(change) for change in folder.changes}
     # A setting of slope_deg changes slope_rad, and any setting may change angles of the start.
     changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
-    before, after = (dict(flatten(dump)) for dump in dumps)
+    before, after = (dict(reads.flatten(dump)) for dump in dumps)
     return file.label, [
         f"{key} {brief(value)} -> {brief(after.get(key))}"
         for key, value in before.items()
@@ -100,7 +95,7 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
     ]
 
 
-def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
+def warn_of_edits(config: schema.Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
     """Warn if the config file of a run was edited after the run. `config` is the run's, or None if that is
     unreadable."""
     if config is None:
@@ -114,10 +109,10 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
         )
 
 
-def refuse_invalid_parts(read: LoadedConfig) -> None:
+def refuse_invalid_parts(read: loader.LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     config = read.config
-    if not isinstance(config.walker, AssembledWalker):
+    if not isinstance(config.walker, walkers.AssembledWalker):
         return
     # Imported here, because mechanics take long to import, and only walkers of parts can be invalid.
     from walkerlab.scene.rigid import level_walker
@@ -125,7 +120,7 @@ def refuse_invalid_parts(read: LoadedConfig) -> None:
     try:
         level_walker(config.walker, config.gravity_m_s2)
     except ConfigError as error:
-        raise problem_error(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
+        raise problems.problem_error(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:

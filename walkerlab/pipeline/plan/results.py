@@ -16,12 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.extensions import WORDS, code_by_word, extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
-from walkerlab.pipeline.store import artifact, provenance
+from walkerlab.pipeline.store import artifact, files, provenance, runs
 from walkerlab.pipeline.store.artifact import Identity, Lookup, Stored, broken_file, changed_parts
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.files import Checkpoint, replacing
 from walkerlab.pipeline.store.provenance import Provenance
-from walkerlab.pipeline.store.runs import RunFolder
 
 
 class Keys:
@@ -111,13 +109,13 @@ class FolderResults:
     folder     path of the run's folder
     """
 
-    def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
+    def __init__(self, folder: runs.RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
         """Store the arguments without reading a file."""
         self.run = folder
         self.folder = folder.path
         self.elsewhere = elsewhere
         self.keys = Keys(graph)
-        self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
+        self._begun: dict[str, tuple[Provenance, files.Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
         """Return a step that reuses a stage's result or runs the stage. With `force` it always runs the stage."""
@@ -143,7 +141,7 @@ class FolderResults:
         Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
         """
         if step.origin is not None:
-            with replacing(self.run.artifact(step.stage.name)) as temporary:
+            with files.replacing(self.run.artifact(step.stage.name)) as temporary:
                 try:
                     os.link(step.origin, temporary)
                 except OSError:
@@ -157,7 +155,7 @@ class FolderResults:
         stage = step.stage
         identity = step.identity
         assert identity is not None, "a stage that is left out does not run"
-        checkpoint = Checkpoint(self.run.checkpoint(stage.name), identity.key)
+        checkpoint = files.Checkpoint(self.run.checkpoint(stage.name), identity.key)
         if force:
             checkpoint.forget()
         digests = {name: input_digest(stage, result) for name, result in inputs.items()}
@@ -201,14 +199,14 @@ def input_digest(stage: Stage, result: Content) -> str:
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
-def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
+def find_elsewhere(folder: runs.RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
     """Find a result with this key in another run folder, and return its file and itself, or None. Damaged files are
     ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
         return None
-    for path in (RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name):
+    for path in (runs.RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name):
         if mentions(path, key):
             verdict = artifact.check(path, key)
             if verdict.accepted and verdict.artifact is not None:
@@ -253,7 +251,7 @@ class MemoryResults:
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
         """Return a checkpoint that is kept only in memory."""
-        return {"checkpoint": Checkpoint(None, "")}
+        return {"checkpoint": files.Checkpoint(None, "")}
 
     def keep(self, step: Step, answer: Content, awaited: bool) -> Content:
         """Keep a result if another stage waits for it."""

@@ -4,8 +4,6 @@ Extensions declare their stages with this module, and the command line builds it
 help fast, it imports no stage, no config schema and no NumPy.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -44,7 +42,7 @@ def no_dependencies(_config: object) -> Mapping[str, Any]:
     return {}
 
 
-def dependency(name: str, code: str) -> Callable[[Config], Mapping[str, Any]]:
+def dependency(name: str, code: str) -> "Callable[[Config], Mapping[str, Any]]":
     """Return a function of the config that returns {name: value}, where `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
 
@@ -116,9 +114,9 @@ class Stage:
     name: str  # name of the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # Type of the slice of the config that `run` takes and on which the result depends, or a function that returns
-    # this type for a config. None means the whole config.
-    takes: type | Callable[[Config], type] | None
+    # Type of the slice of the config that `run` takes and on which the result depends, or a function that returns this
+    # type for a config. None means the whole config.
+    takes: "type | Callable[[Config], type] | None"
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
     needs_equal_legs: bool = False
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
@@ -132,32 +130,32 @@ class Stage:
     early_with: tuple[str, ...] = ()  # stages whose results suffice for a partial drawing while others still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     # returns, by name, whatever the result depends on besides, such as files (digests) and other programs (versions)
-    depends_on: Callable[[Config], Mapping[str, Any]] = no_dependencies
-    checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
+    depends_on: "Callable[[Config], Mapping[str, Any]]" = no_dependencies
+    checks: "Callable[[Config], object]" = nothing  # raises ConfigError for a config with which no command should run
     # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
     adds_command: str = ""
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that show this one's result if it is current
 
-    def takes_under(self, config: Config) -> type | None:
+    def takes_under(self, config: "Config") -> type | None:
         """Return the type of the config slice on which the stage's result depends, or None for the whole config."""
         return self.takes if self.takes is None or isinstance(self.takes, type) else self.takes(config)
 
-    def reads(self, config: Config) -> tuple[str, ...]:
+    def reads(self, config: "Config") -> tuple[str, ...]:
         """Return the dotted config keys on which the stage's result depends."""
         takes = self.takes_under(config)
         return tuple(type(config).model_fields if takes is None else reads.dotted_keys(takes))
 
-    def results(self, config: Config) -> tuple[str, ...]:
+    def results(self, config: "Config") -> tuple[str, ...]:
         """Return the stages whose results this stage uses: required ones, then optional ones."""
         return (*self.inputs(config), *self.if_current)
 
-    def why_unsuited(self, config: Config) -> str | None:
+    def why_unsuited(self, config: "Config") -> str | None:
         """Return the reason why the stage cannot run under a config, or None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
         return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
-    def why_no_such_legs(self, config: Config) -> str | None:
+    def why_no_such_legs(self, config: "Config") -> str | None:
         """Return the reason why the stage has no result for a config's unequal legs, or None if it has one."""
         if not self.needs_equal_legs:
             return None
@@ -170,7 +168,7 @@ class Stage:
 
         return "the legs differ" if have_different_legs(config) else None
 
-    def refuse_unsuited(self, target: str, config: Config) -> None:
+    def refuse_unsuited(self, target: str, config: "Config") -> None:
         """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
         if "recording" in self.requires and config.recording is None:
             raise ConfigError(
@@ -191,7 +189,7 @@ class Stage:
             advice = f"{instead} `walkerlab schema contact` explains its keys."
             raise contact_required_error(target, config.walker, advice)
 
-    def refuse_question(self, config: Config) -> None:
+    def refuse_question(self, config: "Config") -> None:
         """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:

@@ -11,8 +11,7 @@ from inspect import signature
 from queue import SimpleQueue
 from typing import Any
 
-from walkerlab.config.reads import restrict
-from walkerlab.config.schema import Config
+from walkerlab.config import reads, schema
 from walkerlab.errors import NoAnswer
 from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.plan.planner import Planner
@@ -20,19 +19,18 @@ from walkerlab.pipeline.plan.results import MemoryResults, Step
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.run.workers import WorkerPool, tell
-from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
+from walkerlab.pipeline.store import artifact, files
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.files import storage_errors
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 
 Task = Callable[[StageReporter], Content]
 """Call of a stage with its arguments. It takes a reporter and returns the result."""
 
 
-def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
+def task_of(stage: Stage, config: schema.Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
     """Build the task of a stage under a config, for this or another process. `inputs` and the rest are as in
     `call_stage`."""
-    return partial(call_stage, stage.module, restrict(config, stage.takes_under(config)), inputs, offered)
+    return partial(call_stage, stage.module, reads.restrict(config, stage.takes_under(config)), inputs, offered)
 
 
 def call_stage(
@@ -54,7 +52,7 @@ def call_stage(
     run = importlib.import_module(module).run
     arguments = {name: offered[name] for name in offered.keys() & signature(run).parameters.keys()}
     folder = arguments.get("folder")
-    drawing = contextlib.nullcontext() if folder is None else storage_errors(folder)
+    drawing = contextlib.nullcontext() if folder is None else files.storage_errors(folder)
     try:
         with kernel_cache.watch_compilation(partial(note_compilation, reporter)), drawing:
             content = run(config, inputs, reporter, **arguments)
@@ -201,8 +199,8 @@ class Executor:
         number = self._total - len(self._left) + 1 + len(self._running)
         total = max(self._total, number)
         place = [f"{number} of {total}"] if total > 1 else []
-        reason = [step.reason] if step.reason != NOT_THERE else []
-        expected = step.found.provenance.took_s if isinstance(step.found, Stored) else None
+        reason = [step.reason] if step.reason != artifact.NOT_THERE else []
+        expected = step.found.provenance.took_s if isinstance(step.found, artifact.Stored) else None
         reporter = self.reporter.begin(stage.name, ", ".join(place + reason), expected)
         return RunningStage(step, task, reporter, time.perf_counter())
 
@@ -259,7 +257,7 @@ class EarlyDrawings:
 
 
 def answer_in_memory(
-    config: Config, target: str, memory: MemoryResults, *, again: bool = True, reporter: Reporter | None = None
+    config: schema.Config, target: str, memory: MemoryResults, *, again: bool = True, reporter: Reporter | None = None
 ) -> Content:
     """Compute a stage's result without files, reusing inputs from memory.
 
@@ -276,7 +274,7 @@ def answer_in_memory(
     return Content({}, {"no_answer": {"message": planner.left_out[target], "advice": advice}}, complete=False)
 
 
-def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
+def any_side_by_side(stages: Sequence[Stage], config: schema.Config) -> bool:
     """Whether at least two of the stages are independent and can run in parallel."""
     needed: dict[str, set[str]] = {}
     for stage in stages:

@@ -10,10 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.files import DEFAULT, builtin_names, parse_setting
-from walkerlab.config.loader import paper_config_with
-from walkerlab.config.schema import Config
-from walkerlab.config.writer import to_extending_yaml
+from walkerlab.config import files, loader, schema, writer
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.planner import Planner, omission_of
@@ -80,7 +77,7 @@ DEFAULT_OPTIONS = Options()
 
 
 def execute(
-    config: Config,
+    config: schema.Config,
     target: str,
     folder: RunFolder,
     options: Options = DEFAULT_OPTIONS,
@@ -145,14 +142,14 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     """Write the parameters that a stage found as a config of this name, and return its file."""
     summary = report.summary
     values = summary["best"] if "best" in summary else {row["key"]: row["value"] for row in summary["estimates"]}
-    found = run.loaded.variant([parse_setting(f"{key}={value!r}") for key, value in values.items()])
-    base = paper_config_with({}) if run.extends == DEFAULT else run.loaded.base
+    found = run.loaded.variant([files.parse_setting(f"{key}={value!r}") for key, value in values.items()])
+    base = loader.paper_config_with({}) if run.extends == files.DEFAULT else run.loaded.base
     # The new config describes the walker, so it leaves out the block with the question that found it.
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
     # A path in `extends` is relative to the file in which it stands.
-    typed = run.extends if run.extends in builtin_names() else os.path.relpath(run.extends, report.run_dir)
+    typed = run.extends if run.extends in files.builtin_names() else os.path.relpath(run.extends, report.run_dir)
     return write_numbered(
-        report.run_dir / f"{name}.yaml", to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
+        report.run_dir / f"{name}.yaml", writer.to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
     )
 
 

@@ -9,18 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from walkerlab.config.analyses import COORDINATES, Basin
+from walkerlab.config import analyses, walkers
 from walkerlab.config.reads import BasinConfig, RigidConfig
-from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.outcome import Outcome
-from walkerlab.physics.hybrid.recorded_walk import as_state
-from walkerlab.physics.hybrid.rigid_lanes import two_legs
+from walkerlab.physics.hybrid import recorded_walk, rigid_lanes
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits import basin as grid
-from walkerlab.physics.orbits.rigid_map import state_on_section
-from walkerlab.physics.orbits.scaled_starts import ScaledStarts
-from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits import rigid_map, scaled_starts, similarity
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
@@ -53,9 +49,9 @@ def run(
     """
     gait = inputs["fixedpoint"].summary
     rigid = rigid_walker(config)
-    if len(rigid.section_indices) != len(COORDINATES):
+    if len(rigid.section_indices) != len(analyses.COORDINATES):
         raise ConfigError(
-            f"basin needs a walker with {len(COORDINATES)} coordinates just after heel strike; this one has "
+            f"basin needs a walker with {len(analyses.COORDINATES)} coordinates just after heel strike; this one has "
             f"{len(rigid.section_indices)}.",
             "Lock the knees at heel strike: --set walker.knee.at_heel_strike=locked.",
         )
@@ -103,7 +99,7 @@ def sample_again(question: "Question", window: grid.Window, ends: grid.WalkEnds)
 def window_of(config: BasinConfig, z: list[float]) -> grid.Window:
     """Build the grid of starts around the section coordinates z (3) of the gait."""
     settings = config.basin
-    axes = tuple(COORDINATES.index(name) for name in settings.plane)
+    axes = tuple(analyses.COORDINATES.index(name) for name in settings.plane)
     rate = math.sqrt(config.gravity_m_s2 / config.walker.leg_length_m)
     half = (HALF_WIDTH[0], HALF_WIDTH[1] * rate, HALF_WIDTH[2] * rate)
     lower = settings.lower or tuple(z[axis] - half[axis] for axis in axes)
@@ -119,8 +115,8 @@ def question_of(
     """Build the model whose walks are classified, and find its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
-    unit, units = unit_walker(rigid)
-    legs = two_legs(unit)
+    unit, units = similarity.unit_walker(rigid)
+    legs = rigid_lanes.two_legs(unit)
     walker = unit if legs is None else legs
     scale = (1.0, units.time, units.time)
     generator = np.random.default_rng(config.seed)
@@ -134,14 +130,14 @@ def question_of(
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> "ContactQuestion":
     """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
-        raise contact_required_error("basin.model: contact", config.walker, "Add one.")
+        raise walkers.contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
     from walkerlab.scene.contact import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps
     step_length_m = float(gait["step_length_m"])
-    state = as_state(gait["state"])
+    state = recorded_walk.as_state(gait["state"])
     answer = contact.contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
     scene = replace(contact.scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
@@ -150,7 +146,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
-def group_of(settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats) -> Group:
+def group_of(settings: analyses.Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats) -> Group:
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
         name: Variable(window.cell_centres(index), (name,), UNITS[axis], TEXTS[axis])
@@ -168,12 +164,12 @@ def group_of(settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking:
         "steps_to_settle": grid_variable(settled, "steps until the attractor was reached; 0: never"),
         "walking": grid_variable(walking, "fraction of the cell that walks; at the basin's edge, of its subcells"),
     }
-    held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
+    held_values = {f"at_{name}": value for name, value in zip(analyses.COORDINATES, window.rest, strict=True)}
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
 
 
 def summary(
-    settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats, question: "Question"
+    settings: analyses.Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats, question: "Question"
 ) -> dict[str, Any]:
     walks = ends.outcome == Outcome.WALKED
     attractors = question.attractor_rows()
@@ -183,7 +179,7 @@ def summary(
         if row["cells"]:
             row["median_steps_to_settle"] = float(np.median(ends.steps[reaches]))
     sides = zip(settings.plane, window.lower, window.upper, strict=True)
-    values = zip(COORDINATES, window.rest, strict=True)
+    values = zip(analyses.COORDINATES, window.rest, strict=True)
     return {
         "model": settings.model,
         "plane": list(settings.plane),
@@ -242,7 +238,7 @@ class RigidQuestion:
         """Describe each attractor: its period, and a state (SI) on it."""
         rows = []
         for cycle in self.attractors.cycles:
-            state = state_on_section(self.rigid, tuple((cycle.points[0] / np.array(self.scale)).tolist()))
+            state = rigid_map.state_on_section(self.rigid, tuple((cycle.points[0] / np.array(self.scale)).tolist()))
             period = cycle.period * grid.stride_of(self.walker)
             rows.append({"period": period, "state": list(state), "reached_within": cycle.reach})
         return rows
@@ -266,7 +262,7 @@ class ContactQuestion:
 
     scene: contact.ContactScene
     rigid: RigidModel
-    starts: ScaledStarts
+    starts: scaled_starts.ScaledStarts
     pads: Pads
     cells_at_once: int = 100
     edges_at_once: int = 10
@@ -288,7 +284,7 @@ class ContactQuestion:
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
         """Simulate a walk from section coordinates z (3), SI. Return outcome, attractor and number of steps."""
-        state = state_on_section(self.rigid, z)
+        state = rigid_map.state_on_section(self.rigid, z)
         walk = self.starts.walk_from(contact.start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
         return (walk.outcome, grid.UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)

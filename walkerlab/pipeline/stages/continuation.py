@@ -8,19 +8,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from walkerlab.config.analyses import Span
+from walkerlab.config import analyses, walkers
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
-from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.outcome import outcome_of
+from walkerlab.physics.orbits import bifurcations, fixed_point, newton, two_parameters
 from walkerlab.physics.orbits.attractors import feigenbaum_ratios, may_diverge
-from walkerlab.physics.orbits.bifurcations import Bifurcation
 from walkerlab.physics.orbits.families import Crossing, GaitBranch, Seed, ValueSpan, steps_word
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID, THOROUGHNESS, Family, FamilySearch
-from walkerlab.physics.orbits.fixed_point import find_gaits
-from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
-from walkerlab.physics.orbits.two_parameters import Plane
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
 from walkerlab.pipeline.stages.walk import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
@@ -34,7 +30,7 @@ Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds of a search, and a function that builds the step map of a config over the parameter."""
 MIN_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHT_EFFORT = Effort(1e-13)  # accuracy of Newton's method for measuring the numerical error
+TIGHT_EFFORT = newton.Effort(1e-13)  # accuracy of Newton's method for measuring the numerical error
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
@@ -91,7 +87,7 @@ class FamilyQuestion:
         return touched
 
 
-def question_over(block: Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
+def question_over(block: analyses.Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
     parameter = parameter_of(block.over, config, (*path, "over"))
     return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
 
@@ -143,7 +139,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     config = question.config
     second = question.second
     if question.models != (RIGID,) and config.contact is None:
-        raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
+        raise walkers.contact_required_error("the contact model", config.walker, "Use --model rigid.")
     question.refuse_ends("continuation")
     if second is not None:
         second.refuse_ends("continuation", "second")
@@ -177,7 +173,7 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
     if second is not None and second.touches(model):
         parameter = second.parameter
         config = question.config
-        plane = Plane(parameter.vary(config, map_of), second.span, parameter.value_in(config))
+        plane = two_parameters.Plane(parameter.vary(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
     step_map = map_of(question.config)
     step_map.stride = question.stride
@@ -192,7 +188,7 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     for value in question.start_values():
         walker = walker_at(value)
         if walker is not None:
-            gaits = find_gaits(walker, question.config.seed).gaits
+            gaits = fixed_point.find_gaits(walker, question.config.seed).gaits
             seeds += [Seed(np.array(gait.z), value, question.stride) for gait in gaits]
     return seeds, partial(rigid_map, parameter=question.parameter, scale=question.span.size)
 
@@ -206,7 +202,7 @@ def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
         changed = question.parameter.config_at(question.config, value)
         if changed is None or changed.contact is None:
             continue
-        rigid = find_gaits(rigid_walker(changed), changed.seed).gait
+        rigid = fixed_point.find_gaits(rigid_walker(changed), changed.seed).gait
         if rigid is None:
             continue
         answer = gait_off_pads(changed, rigid.step_length, rigid.state)
@@ -382,7 +378,7 @@ def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
     return [flip.value for flip in flips[:1]]
 
 
-def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool:
+def is_born_in(child: GaitBranch, flip: bifurcations.Bifurcation, parent: GaitBranch) -> bool:
     """Whether a branch begins or ends at a flip of another branch."""
     if flip.kind != "flip" or child.period != 2 * parent.period:
         return False

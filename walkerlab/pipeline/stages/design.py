@@ -6,12 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from walkerlab.config.analyses import Design
+from walkerlab.config import analyses, schema, walkers
 from walkerlab.config.reads import DesignConfig
-from walkerlab.config.schema import Config
-from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
+from walkerlab.physics.orbits import fixed_point, newton
 from walkerlab.physics.orbits.design import (
     BOUND_TOLERANCE,
     DesignProblem,
@@ -21,9 +20,7 @@ from walkerlab.physics.orbits.design import (
     minimise,
     search_from_starts,
 )
-from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities
-from walkerlab.physics.orbits.newton import Effort, NotConverged
 from walkerlab.physics.orbits.robustness import LARGEST, GaitOnMap, largest_disturbance
 from walkerlab.physics.orbits.step_map import gait_near, multipliers_of
 from walkerlab.physics.solvers.system import Floats
@@ -34,7 +31,7 @@ from walkerlab.scene.parameter import Parameter, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
-SOLVED: Final = Effort(1e-10)
+SOLVED: Final = newton.Effort(1e-10)
 DIFFERENCE: Final = 5e-3  # step, relative to the range of the bounds, of difference quotients of largest disturbances
 FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; at a coarser one, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
@@ -55,7 +52,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
     refuse(config)
-    design = config.design or Design()
+    design = config.design or analyses.Design()
     quantity = design.minimise or design.maximise
     assert quantity is not None, "refuse rejects a design without a quantity"
     parameters = [parameter_of(key, config) for key in design.over]
@@ -133,14 +130,14 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
 
 def refuse(config: DesignConfig) -> None:
     """Raise ConfigError for an invalid `design` block."""
-    design = config.design or Design()
+    design = config.design or analyses.Design()
     if (design.minimise or design.maximise) is None or not design.over:
         raise ConfigError(
             "design needs a quantity to optimise and a parameter to vary.",
             "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
         )
     if design.model == "contact" and config.contact is None:
-        raise contact_required_error("design.model: contact", config.walker, "Add one.")
+        raise walkers.contact_required_error("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]
     for key in design.over:
         refuse_unread("design.over", key, config, (design.model,))
@@ -156,7 +153,7 @@ def refuse(config: DesignConfig) -> None:
                 raise parameter.refusal(config, bound, ("design", "over"))
 
 
-def keys_on_bound(design: Design, x: Floats) -> list[str]:
+def keys_on_bound(design: analyses.Design, x: Floats) -> list[str]:
     """Return the keys whose optimum lies on a bound."""
     pairs = zip(design.over.items(), x.tolist(), strict=True)
     return [
@@ -170,7 +167,7 @@ class Gaits:
     def __init__(
         self,
         config: DesignConfig,
-        design: Design,
+        design: analyses.Design,
         parameters: list[Parameter],
         gait: Mapping[str, Any],
         progress: Progress,
@@ -201,7 +198,7 @@ class Gaits:
             self.sections[x.tobytes()] = self.z
         return gait
 
-    def gait_of(self, config: Config) -> Point | None:
+    def gait_of(self, config: schema.Config) -> Point | None:
         """Find the gait of a config near the last gait, or by a search from scratch."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.gait_on_map()
@@ -209,7 +206,7 @@ class Gaits:
         # Newton's method may have failed because the last gait belongs to parameter values far away.
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
-            gait = find_gaits(walker, config.seed).gait
+            gait = fixed_point.find_gaits(walker, config.seed).gait
             match = (
                 match if gait is None else self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
             )
@@ -236,7 +233,7 @@ class Gaits:
         """Find the gait near z (d,) and its quantities. Return None if there is no gait or a quantity is undefined."""
         step_map = standpoint_before.step_map
         cycle = gait_near(step_map, z, standpoint_before.p, SOLVED, step_map.stride)
-        if isinstance(cycle, NotConverged):
+        if isinstance(cycle, newton.NotConverged):
             return None
         standpoint = standpoint_before._replace(z=cycle.z, A=cycle.DP)
         numbers = gait_quantities(standpoint, self.wanted)

@@ -8,18 +8,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.contact import Footholds
-from walkerlab.config.reads import ContactConfig
-from walkerlab.config.schema import Output
+from walkerlab.config import contact, reads, schema
 from walkerlab.labels import Label
+from walkerlab.physics.orbits import family_search, rigid_map, similarity, step_map, two_parameters
 from walkerlab.physics.orbits.families import GaitBranch
-from walkerlab.physics.orbits.family_search import RIGID, Family
-from walkerlab.physics.orbits.rigid_map import state_on_section
-from walkerlab.physics.orbits.similarity import unit_walker
-from walkerlab.physics.orbits.step_map import Cycle, Monitor
-from walkerlab.physics.orbits.two_parameters import BifurcationCurve, Regions
-from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
-from walkerlab.physics.solvers.system import Floats
+from walkerlab.physics.solvers import registry, system
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
 from walkerlab.pipeline.stages.walk import evenly_spread, select_samples
 from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
@@ -29,8 +22,8 @@ from walkerlab.scene.rigid import rigid_scene
 MOTIONS_OF_BRANCH = 12  # maximum number of gaits per branch whose walks are stored
 MAX_MOTION_PERIOD = 4  # the walks of gaits with longer periods (steps) are not stored
 STRIDE = 2  # number of steps after which the legs have the same roles again
-TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
-ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
+TOLERANCES = registry.Tolerances("dop853", 1e-9, 1e-11, registry.ENDLESS)
+ALL_OUTPUTS: Final[tuple[schema.Output, ...]] = ("states", "energies", "forces")
 SAMPLE_STRIDE = 3  # of the samples between heel strikes, every third is stored
 
 MODEL = Label("", "model")
@@ -62,8 +55,8 @@ MARKS = {
 
 
 def groups(
-    families: Sequence[Family], answer: Mapping[str, Any], config: ContactConfig, parameter: Parameter,
-    second: Parameter | None,
+    families: Sequence[family_search.Family], answer: Mapping[str, Any], config: reads.ContactConfig,
+    parameter: Parameter, second: Parameter | None,
 ) -> dict[str, Group]:  # fmt: skip
     """Build a group for each branch and curve, and for the bifurcations, exponents and attractor of each model.
 
@@ -73,7 +66,7 @@ def groups(
     value = {"value": Label(parameter.unit, parameter.key)}
     stored: dict[str, Group] = {}
 
-    def coordinates(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
+    def coordinates(plane: two_parameters.BifurcationCurve | two_parameters.Regions, *dims: str) -> dict[str, Variable]:
         """Return the coordinates of both parameters."""
         axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
         return {
@@ -109,7 +102,7 @@ def groups(
             own["lyapunov"] = Group(columns(family.exponents, value | EXPONENTS, "sample"))
         if family.attractors.found:
             own["attractor"] = Group(columns(family.attractors.found, value | ATTRACTORS, "sample"))
-        if family.model == RIGID:
+        if family.model == family_search.RIGID:
             own |= motions(family.branches, config, parameter)
         stored |= {f"{family.model}/{name}": group for name, group in own.items()}
     return stored
@@ -121,8 +114,8 @@ class Mark(NamedTuple):
     after: int
     kind: str
     value: float
-    periods: Floats  # durations of the gait's steps (s)
-    angles: Floats  # angle of the stance leg just after each heel strike of the gait (rad)
+    periods: system.Floats  # durations of the gait's steps (s)
+    angles: system.Floats  # angle of the stance leg just after each heel strike of the gait (rad)
 
 
 def marks_on(branch: GaitBranch) -> list[Mark]:
@@ -149,7 +142,7 @@ def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
 
 
 def branch_group(
-    branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[Monitor], value: Mapping[str, Label]
+    branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[step_map.Monitor], value: Mapping[str, Label]
 ) -> Group:
     """Build the group of a branch, with gaits and bifurcations in order.
 
@@ -171,7 +164,7 @@ def branch_group(
     return Group(variables, {"period": branch.period, "begins": begin.reason, "ends": end.reason})
 
 
-def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
+def motions(branches: Sequence[GaitBranch], config: reads.ContactConfig, parameter: Parameter) -> dict[str, Group]:
     """Build groups such as branch_0/motion_7, the sampled walks of a few gaits, evenly spread along each rigid
     branch."""
     return {
@@ -183,15 +176,15 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
     }
 
 
-def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
+def motion(point: step_map.Cycle, period: int, config: reads.ContactConfig, parameter: Parameter) -> Iterator[Group]:
     """Simulate a gait and yield its samples in the layout of `simulate`, or nothing if the config rejects the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return
-    scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
-    unit, units = unit_walker(scene.walker)
+    scene = rigid_scene(changed, contact.Footholds(), ALL_OUTPUTS)
+    unit, units = similarity.unit_walker(scene.walker)
     # Points of a branch are states of a walker of unit size, so they are scaled to this walker.
-    section = state_on_section(unit, point.z)
+    section = rigid_map.state_on_section(unit, point.z)
     n = len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)

@@ -1,7 +1,5 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -10,48 +8,34 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.analyses import Plan
-from walkerlab.config.identify import Identify
-from walkerlab.config.reads import PlanConfig
-from walkerlab.config.schema import Config
+from walkerlab.config import analyses, identify, reads, schema
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.physics.estimation.fit import linearise
+from walkerlab.physics.estimation import fit, measurements, mixed_model, prediction, result
 from walkerlab.physics.estimation.information import information_from, open_combinations
-from walkerlab.physics.estimation.measurements import (
-    LEG_ANGLE,
-    STEP_LENGTH,
-    STEP_PERIOD,
-    MeasuredWalk,
-    split_into_steps,
-)
-from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
-from walkerlab.physics.estimation.prediction import DELAY, Forecast
-from walkerlab.physics.estimation.result import Unidentifiable
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.scene.identification import ConfigFamily, problem_of, step_map_of
-from walkerlab.scene.parameter import parameter_of
+from walkerlab.scene import identification, parameter
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 
 
-def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
+def run(config: reads.PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
     """Predict the errors of several ways to measure a walk.
 
     Raises ConfigError for an invalid request.
     """
     refuse(config)
-    block = cast("Identify", config.identify)
-    plan = config.plan or Plan()
+    block = cast("identify.Identify", config.identify)
+    plan = config.plan or analyses.Plan()
     progress.start("plan")
     if block.data:
         progress.note(f"a plan needs no measured walk: {block.data} is not read")
     gait = inputs["fixedpoint"].summary
-    options = plan_measurements(cast("Config", config), gait, block, plan, progress.note)
+    options = plan_measurements(cast("schema.Config", config), gait, block, plan, progress.note)
     keys = tuple(options[0].errors)
-    units = {key: parameter_of(key, config).unit for key in keys}
+    units = {key: parameter.parameter_of(key, config).unit for key in keys}
     determining = next((option for option in options if None not in option.errors.values()), None)
     summary = {
         "model": block.model,
@@ -66,10 +50,10 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
     return Content({"errors": curves_of(options, keys)}, summary)
 
 
-def refuse(config: PlanConfig) -> None:
+def refuse(config: reads.PlanConfig) -> None:
     """Raise ConfigError for an invalid `plan` or `identify` block."""
-    block = config.identify or Identify()
-    plan = config.plan or Plan()
+    block = config.identify or identify.Identify()
+    plan = config.plan or analyses.Plan()
     if not block.fit:
         raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
     if block.model == "both":
@@ -89,7 +73,7 @@ def refuse(config: PlanConfig) -> None:
         )  # fmt: skip
 
 
-def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
+def row_of(option: "WayToMeasure", units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
     errors = [
         {"key": key, "standard_error": error, "unit": units[key]}
         | ({"wanted": wanted[key], "steps_needed": option.steps_needed[key]} if key in wanted else {})
@@ -103,7 +87,7 @@ def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, 
     }
 
 
-def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
+def curves_of(options: "Sequence[WayToMeasure]", keys: Sequence[str]) -> Group:
     """Build the group of errors by number of steps, with missing values for undetermined parameters."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
@@ -122,9 +106,9 @@ def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
 
 
 STEP_MEASUREMENTS: Final = {
-    "periods": (STEP_PERIOD,),
-    "periods and lengths": (STEP_PERIOD, STEP_LENGTH),
-    "periods, lengths and touch angles": (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE),
+    "periods": (measurements.STEP_PERIOD,),
+    "periods and lengths": (measurements.STEP_PERIOD, measurements.STEP_LENGTH),
+    "periods, lengths and touch angles": (measurements.STEP_PERIOD, measurements.STEP_LENGTH, measurements.LEG_ANGLE),
 }
 ANGLES: Final = "angles over time"
 SHORTER_WALK: Final = "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change)."
@@ -141,17 +125,17 @@ class WayToMeasure:
     measurement: str
     start: str
     errors: dict[str, float | None]  # standard error of each key, in its unit; None if the walk does not determine it
-    not_identifiable: tuple[Unidentifiable, ...]
+    not_identifiable: tuple[result.Unidentifiable, ...]
     # steps needed to reach the target error of each key; None if the longest walk is too short
     steps_needed: dict[str, int | None]
     curve: dict[int, dict[str, float | None]]  # errors by number of steps
 
 
 def plan_measurements(
-    config: Config,
+    config: schema.Config,
     gait: Mapping[str, Any],
-    question: Identify,
-    plan: Plan,
+    question: identify.Identify,
+    plan: analyses.Plan,
     note: Callable[[str], None] = lambda _: None,
 ) -> tuple[WayToMeasure, ...]:
     """Compute the parameter errors that would remain after each way of measuring a walk, simple ways first.
@@ -166,7 +150,7 @@ def plan_measurements(
     for start, change in ((AT_GAIT, 0.0), (OFF_GAIT, plan.start_change)):
         moved = replace(subject, z=subject.z * (1.0 + change))
         of_steps, of_angles = (walk_of(moved, each, question) for each in predict_measured(moved, question, plan))
-        for measurement, quantities in (*STEP_MEASUREMENTS.items(), (ANGLES, (LEG_ANGLE,))):
+        for measurement, quantities in (*STEP_MEASUREMENTS.items(), (ANGLES, (measurements.LEG_ANGLE,))):
             walk = of_angles if measurement == ANGLES else of_steps
             errors_after = partial(expected_errors, walk, quantities, question.keys, plan)
             counts = {*(count for count in CURVE if count <= plan.max_steps), plan.max_steps}
@@ -176,16 +160,18 @@ def plan_measurements(
     return tuple(options)
 
 
-Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
+Errors = tuple[dict[str, float | None], tuple[result.Unidentifiable, ...]]
 
 
-def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredWalk, MeasuredWalk]:
+def predict_measured(
+    subject: ModelUnderTest, question: identify.Identify, plan: analyses.Plan
+) -> tuple[measurements.MeasuredWalk, measurements.MeasuredWalk]:
     """Predict the step values and the sampled angles of a walk that starts in the state z of `subject`.
 
     Raises NoAnswer if the walk ends early.
     """
-    family = ConfigFamily(subject.config, question.keys)
-    walks = step_map_of(subject, family)
+    family = identification.ConfigFamily(subject.config, question.keys)
+    walks = identification.step_map_of(subject, family)
     # The walk has one step more than are measured, because samples must lie before its last heel strike.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
@@ -199,31 +185,31 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
     angles = walks.sample_legs(subject.z, family.start, level, times)  # type: ignore[arg-type]
     quantities = walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps]
-    of_steps = MeasuredWalk(*quantities, first_leg=subject.first_leg)
-    return of_steps, replace(split_into_steps(times, angles, touches), first_leg=subject.first_leg)
+    of_steps = measurements.MeasuredWalk(*quantities, first_leg=subject.first_leg)
+    return of_steps, replace(measurements.split_into_steps(times, angles, touches), first_leg=subject.first_leg)
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
     """Walk that is predicted, not measured, with its derivatives."""
 
-    forecast: Forecast
-    data: Linearised
+    forecast: prediction.Forecast
+    data: mixed_model.Linearised
     step: NDArray[np.int64]  # (values,) index of each value's step
 
 
-def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> PlannedWalk:
+def walk_of(subject: ModelUnderTest, measured: measurements.MeasuredWalk, question: identify.Identify) -> PlannedWalk:
     """Return the planned walk with its derivatives.
 
     Raises NoAnswer if a slightly changed walk ends early.
     """
-    problem = problem_of(subject, measured, question)
+    problem = identification.problem_of(subject, measured, question)
     if measured.sampled:
         # `identify` always fits a delay to angles at their sample times.
-        nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
+        nuisances = tuple(dict.fromkeys((*question.sensors, prediction.DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
-    data = linearise(problem, problem.initial_unknowns(), np.zeros(forecast.heights), exact=True)
+    data = fit.linearise(problem, problem.initial_unknowns(), np.zeros(forecast.heights), exact=True)
     if data is None:
         raise NoAnswer(
             f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
@@ -234,17 +220,21 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 
 
 def expected_errors(
-    walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
+    walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: analyses.Plan, steps: int
 ) -> Errors:
     """Return the errors that remain if `measured` quantities of the first steps are known, and which combinations are
     open."""
-    noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
+    noise = {
+        measurements.STEP_PERIOD: plan.period_noise_s,
+        measurements.STEP_LENGTH: plan.length_noise_m,
+        measurements.LEG_ANGLE: plan.angle_noise_rad,
+    }
     data = walk.data
     quantities = walk.forecast.quantities
     rows = np.isin(data.quantity, [quantities.index(name) for name in measured]) & (walk.step < steps)
     seen = replace(data, residuals=data.residuals[rows], J=data.J[rows], G=data.G[rows], quantity=data.quantity[rows])
-    deviations = Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)
-    whole = evaluate(reduce(seen), deviations).information
+    deviations = mixed_model.Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)
+    whole = mixed_model.evaluate(mixed_model.reduce(seen), deviations).information
     information = information_from(whole, keys, walk.forecast.scales, int(np.count_nonzero(rows)))
     combinations, left_open = open_combinations(information)
     errors = zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True)

@@ -4,30 +4,28 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from walkerlab.config.reads import SimulateConfig
-from walkerlab.config.schema import MidStep
+from walkerlab.config import reads, schema
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.rigid_groups import groups
 from walkerlab.pipeline.stages.walk import content_of_walk, measure_pace, rigid_start, summarise_walk
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.omissions import rigid_walk_omissions
-from walkerlab.scene.rigid import rigid_scene
+from walkerlab.scene import omissions, rigid
 
 
-def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+def run(config: reads.SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Simulate `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
 
     Raises NoAnswer if the integrator fails.
     """
-    scene = rigid_scene(config, config.ground, config.outputs)
+    scene = rigid.rigid_scene(config, config.ground, config.outputs)
     settings = config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
     (length, start), steps = rigid_start(config, inputs), 2 * config.strides
-    reference = length if "fixedpoint" in inputs or isinstance(config.start, MidStep) else None
+    reference = length if "fixedpoint" in inputs or isinstance(config.start, schema.MidStep) else None
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
@@ -38,7 +36,7 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
 
 
-def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
+def summary(config: reads.SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
     return {
         **summarise_walk(walk),
         **measure_pace(config, walk),
@@ -54,5 +52,5 @@ def summary(config: SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:
         "objections": list(walk.objections),
         "equations": config.equations,
         "slope_rad": config.slope_rad,
-        "left_out": list(rigid_walk_omissions(config)),
+        "left_out": list(omissions.rigid_walk_omissions(config)),
     }

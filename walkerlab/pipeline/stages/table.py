@@ -3,8 +3,6 @@
 The command line builds its help from this file, so the file imports no stage, no config schema and no NumPy.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -27,11 +25,11 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 
-def check_laws(config: Config) -> None:
+def check_laws(config: "Config") -> None:
     """Raise ConfigError if a law of another package is incomplete, before anything is compiled."""
     contact = config.contact
     if config.walker.hip.hinge_law not in WORDS["hinge_law"]:
-        load("walkerlab.scene.laws:hinge_law_of")(config.walker)
+        load("walkerlab.scene.parts:hinge_law_of")(config.walker)
     if contact is not None and any(getattr(contact, key) not in WORDS[key] for key in ("normal_force", "friction")):
         load("walkerlab.scene.contact:ground_laws")(contact)
 

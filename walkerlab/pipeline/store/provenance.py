@@ -10,11 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import walkerlab
-from walkerlab.config.schema import Config
-from walkerlab.config.writer import to_yaml
+from walkerlab.config import schema, writer
 from walkerlab.extensions import external_extensions
-from walkerlab.pipeline.store.commit import commit_of_package
-from walkerlab.pipeline.store.files import as_text
+from walkerlab.pipeline.store import commit, files
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
 """Libraries that results and figures may depend on."""
@@ -47,11 +45,11 @@ class Provenance:
         return replace(self, ended_utc=utc_now())
 
 
-def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
+def begin(config: schema.Config, input_digests: Mapping[str, str]) -> Provenance:
     """Begin the provenance of a stage that starts now in this process."""
     now = utc_now()
     return Provenance(
-        config=to_yaml(config),
+        config=writer.to_yaml(config),
         command_line=command_line(),
         seed=config.seed,
         started_utc=now,
@@ -69,7 +67,7 @@ def command_line() -> str:
     """Return the command line of this process."""
     program = Path(sys.argv[0]).name
     # Under `python -m walkerlab`, the program is called __main__.py.
-    return shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])])
+    return shlex.join(["walkerlab" if program == "__main__.py" else program, *map(files.as_text, sys.argv[1:])])
 
 
 def utc_now() -> str:
@@ -91,4 +89,4 @@ def library_versions() -> dict[str, str]:
 
 def git_commit() -> str | None:
     """Return the commit of the source from which this package runs or was built, or None if it is unknown."""
-    return commit_of_package(Path(walkerlab.__file__).parent)
+    return commit.commit_of_package(Path(walkerlab.__file__).parent)

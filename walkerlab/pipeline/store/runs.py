@@ -9,13 +9,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from walkerlab.config import problems, schema, validation, writer
 from walkerlab.config.files import SHOWN_PATH
-from walkerlab.config.problems import printable, suggestion
 from walkerlab.config.reader import read as read_text
-from walkerlab.config.schema import Config
 from walkerlab.config.tree import BlockNode
-from walkerlab.config.validation import validate_tree
-from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, LockedError
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged, Stored, differences, indexed_files, read
@@ -206,11 +203,11 @@ def stored_in(folder: RunFolder) -> list[str]:
     return [path.stem for path in folder.path.glob("*.h5")]
 
 
-def config_of(folder: RunFolder) -> Config | None:
+def config_of(folder: RunFolder) -> schema.Config | None:
     """Return the config of a run, or None if it is unknown or this version's schema rejects it."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
-        return validate_tree(tree) if isinstance(tree, BlockNode) else None
+        return validation.validate_tree(tree) if isinstance(tree, BlockNode) else None
     except ConfigError:
         return None
 
@@ -249,26 +246,26 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     if run is not None:
         return run
     names = sorted(path.name for path in runs_dir.glob("*/"))
-    near = suggestion(Path(text).name, names) or (f" Available runs: {', '.join(names)}." if names else "")
+    near = problems.suggestion(Path(text).name, names) or (f" Available runs: {', '.join(names)}." if names else "")
     raise ConfigError(
-        f"there is no run {printable(text, SHOWN_PATH)}.{near}",
+        f"there is no run {problems.printable(text, SHOWN_PATH)}.{near}",
         "`walkerlab report` creates the run of the paper config.",
     )
 
 
-def claim(folder: RunFolder, config: Config) -> None:
+def claim(folder: RunFolder, config: schema.Config) -> None:
     """Record in a folder to which config its results belong. Call this under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config` does.
     """
     refuse_another_config(folder, config)
     record = folder.record()
-    new_record = Record(folder.name, folder.source, to_yaml(config), folder.changes)
+    new_record = Record(folder.name, folder.source, writer.to_yaml(config), folder.changes)
     if record is None or (is_of_same_config_file(record, folder) and record != new_record):
         folder.write_record(new_record)
 
 
-def refuse_another_config(folder: RunFolder, config: Config) -> None:
+def refuse_another_config(folder: RunFolder, config: schema.Config) -> None:
     """Raise ConfigError if a folder has results of another config, unless that is an earlier version of the same file.
 
     The name and the `sweep` block are not compared, since no result depends on them.

@@ -9,13 +9,8 @@ from typing import Any, Final, Literal
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.contact import Contact
+from walkerlab.config import contact, files, problems, reader, schema, tree
 from walkerlab.config.fields import annotation_of, leaves, value_at
-from walkerlab.config.files import ConfigSetting
-from walkerlab.config.problems import nearest, problem_error
-from walkerlab.config.reader import read
-from walkerlab.config.schema import Config, SlopeInDegrees
-from walkerlab.config.tree import ListNode, Position, Scalar, plain
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.headlines import QUANTITIES, has_quantity
 
@@ -39,11 +34,11 @@ class Axis:
     source: str  # origin of the values, for messages
     ends: tuple[float, float] | None = None  # ends of the interval to sample; None for a list of values
 
-    def setting(self, index: int) -> ConfigSetting:
+    def setting(self, index: int) -> files.ConfigSetting:
         """Return one value as a `--set` option."""
         value = self.values[index]
-        place = Position(self.source, 0, 0)
-        return ConfigSetting(tuple(self.key.split(".")), Scalar(place, value, str(value)), place)
+        place = tree.Position(self.source, 0, 0)
+        return files.ConfigSetting(tuple(self.key.split(".")), tree.Scalar(place, value, str(value)), place)
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class SweptStage:
 
         return tuple(int(place) for place in np.unravel_index(index, self.shape))
 
-    def settings(self, index: int) -> list[ConfigSetting]:
+    def settings(self, index: int) -> list[files.ConfigSetting]:
         """Return one point as `--set` options."""
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 
@@ -123,7 +118,7 @@ def build_sweep(
     repeated = {key for key in keys if keys.count(key) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
-        raise problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
+        raise problems.problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
         return SweptStage(stage, draw_samples(axes, sample, seed), "list")
     for parameter in axes:
@@ -131,14 +126,14 @@ def build_sweep(
             raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", VALUE_FORMS)
     if zipped and len({len(parameter.values) for parameter in axes}) > 1:
         lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
-        raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
+        raise problems.problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
     return SweptStage(stage, axes, "list" if zipped else "grid")
 
 
 def refuse_too_many(what: str, count: int) -> None:
     """Raise ConfigError for more than MAX_POINTS points. `what` is the option or key that requests them."""
     if count > MAX_POINTS:
-        raise problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
+        raise problems.problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
@@ -152,22 +147,22 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     if not equals or not all(key.split(".")):
         raise parameter_error(source, "is not of the form KEY=VALUES", VALUE_FORMS)
     if values.lstrip().startswith("["):
-        node = read(values, source, len(key) + 2)
-        assert isinstance(node, ListNode)
-        return key, [plain(item) for item in node.items], f"--over {key}"
+        node = reader.read(values, source, len(key) + 2)
+        assert isinstance(node, tree.ListNode)
+        return key, [tree.plain(item) for item in node.items], f"--over {key}"
     return key, values.strip(), source
 
 
 def parameter_error(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
     """Build the error for an invalid parameter, option or key. The message names `source` instead of a position in a
     file."""
-    return problem_error(Position(source, 0, 0), text, allowed, near)
+    return problems.problem_error(tree.Position(source, 0, 0), text, allowed, near)
 
 
 @cache
 def key_fields() -> dict[str, FieldInfo]:
     """Return the field of every config key that holds a value, by dotted key."""
-    return {".".join(path): field for path, field in leaves(Config)} | dict(SlopeInDegrees.model_fields)
+    return {".".join(path): field for path, field in leaves(schema.Config)} | dict(schema.SlopeInDegrees.model_fields)
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
@@ -180,7 +175,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
         if any(known_key.startswith(f"{key}.") for known_key in fields):
             raise parameter_error(source, f"{key}: is a block of keys, not a value")
         if not key.startswith("walker."):  # points may have other types of walkers, so each is checked
-            raise parameter_error(source, f"{key}: unknown key", near=nearest(key, fields))
+            raise parameter_error(source, f"{key}: unknown key", near=problems.nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
@@ -228,7 +223,9 @@ def draw_samples(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ..
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:
         allowed = ", ".join(f"{sampler}:N" for sampler in SAMPLERS)
-        raise problem_error(Position(f"--sample {sample}", 1, 1), "is not a sampler with a number of points", allowed)
+        raise problems.problem_error(
+            tree.Position(f"--sample {sample}", 1, 1), "is not a sampler with a number of points", allowed
+        )
     refuse_too_many(f"--sample {sample}", int(number))
     import numpy as np
 
@@ -259,7 +256,7 @@ def values_at(axis: Axis, column: Any) -> Iterator[Value]:
             yield axis.values[min(int(share * len(axis.values)), len(axis.values) - 1)]
 
 
-def described(config: Config, key: str) -> tuple[str, str]:
+def described(config: schema.Config, key: str) -> tuple[str, str]:
     """Return unit and meaning of a key. The unit may depend on the config."""
     *above, last = key.split(".")
     block = value_at(config, above)
@@ -268,7 +265,7 @@ def described(config: Config, key: str) -> tuple[str, str]:
     if field is None:
         return "1", key
     unit = annotation_of(field, "unit")
-    return (config.contact or Contact()).unit_of(unit), field.description or key
+    return (config.contact or contact.Contact()).unit_of(unit), field.description or key
 
 
 def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
@@ -279,7 +276,7 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
     for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):
             quantities = QUANTITIES[question.stage]
-            near = nearest(name, (*quantities, *question.names))
+            near = problems.nearest(name, (*quantities, *question.names))
             shown = (quantity for quantity in quantities if quantity != "outcome")
             listed = ", ".join(quantity + "…" if quantity.endswith(".") else quantity for quantity in shown)
             hint = f" Did you mean {near}?" if near else ""

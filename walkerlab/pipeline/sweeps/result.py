@@ -14,10 +14,8 @@ from walkerlab.config.schema import Config
 from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, axis_label, unit_by_name
 from walkerlab.physics.solvers.system import Integers
 from walkerlab.pipeline.headlines import LAST_STEP_SOURCES, headlines
-from walkerlab.pipeline.store.artifact import InTurn
+from walkerlab.pipeline.store import artifact, files, hdf5
 from walkerlab.pipeline.store.content import Content, Variable
-from walkerlab.pipeline.store.files import csv_text
-from walkerlab.pipeline.store.hdf5 import stored_bytes
 from walkerlab.pipeline.sweeps.chunk import Chunk
 from walkerlab.pipeline.sweeps.question import SweptStage, described
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
@@ -136,7 +134,7 @@ class Merge:
         """Return a quantity at the points, with NaN or '' where it is missing, or None if no point has it."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
-    def content(self) -> InTurn:
+    def content(self) -> artifact.InTurn:
         """Return the content to store. Call this only once, because it removes the columns."""
         question = self.question
         parameters = dict(coordinates(question, self.config))
@@ -155,11 +153,11 @@ class Merge:
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: column for name, column in parameters.items() if column.dims == (name,)}
-        size = sum(stored_bytes(column.values) for column in self.columns.values())
+        size = sum(hdf5.stored_bytes(column.values) for column in self.columns.values())
         # A quantity that is also a parameter is stored only as the coordinate of that parameter.
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
-        return InTurn(summary, attrs, scales, variables, size)
+        return artifact.InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
         """Describe how walks ended, and whether the ground is why. Return [] for a stage that simulates no walk."""
@@ -256,7 +254,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     for name, variable in variables.items():
         if name not in columns:
             columns.update(flat_columns(name, variable, dimensions))
-    return csv_text([*columns], zip(*columns.values(), strict=True)).decode()
+    return files.csv_text([*columns], zip(*columns.values(), strict=True)).decode()
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:

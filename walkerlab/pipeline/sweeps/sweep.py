@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.loader import LoadedConfig
+from walkerlab.config import loader, reads, schema
 from walkerlab.config.problems import SHOWN_PROBLEMS
-from walkerlab.config.reads import canonical_json
-from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.extensions import versions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
@@ -23,12 +21,9 @@ from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.run.work import Spread, WorkUnit
 from walkerlab.pipeline.stages.walk import SAMPLE, evenly_spread
-from walkerlab.pipeline.store import artifact, provenance
+from walkerlab.pipeline.store import artifact, files, hdf5, provenance, runs
 from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.pipeline.store.files import make_folder
-from walkerlab.pipeline.store.hdf5 import GroupOnDisk
-from walkerlab.pipeline.store.runs import RunFolder, claim, refuse_another_config
 from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
 from walkerlab.pipeline.sweeps.engines import ENGINES, EngineOptions, SweepEngine
 from walkerlab.pipeline.sweeps.question import SweptStage
@@ -67,7 +62,7 @@ class Swept:
     @property
     def group(self) -> Group:
         """Variables over the points, each read from the file on access."""
-        return GroupOnDisk(self.path)
+        return hdf5.GroupOnDisk(self.path)
 
     @property
     def failed(self) -> int:
@@ -102,7 +97,9 @@ class Foreseen:
 class SweepRun:
     """Sweep whose points are all valid."""
 
-    def __init__(self, question: SweptStage, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
+    def __init__(
+        self, question: SweptStage, loaded: loader.LoadedConfig, folder: runs.RunFolder, graph: Graph = PIPELINE
+    ) -> None:
         """Check every point against the schema.
 
         Raises ConfigError for invalid points and for a stage that cannot be swept.
@@ -123,10 +120,10 @@ class SweepRun:
         over = {axis.key: list(axis.values) for axis in question.axes}
         base = loaded.config.model_dump(mode="json", exclude={"sweep"})
         self.slice = {"of": question.stage, "over": over, "layout": question.layout, "config": base}
-        digest = hashlib.sha256(canonical_json(self.slice).encode()).hexdigest()[:8]
+        digest = hashlib.sha256(reads.canonical_json(self.slice).encode()).hexdigest()[:8]
         self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
 
-    def config(self, index: int) -> Config:
+    def config(self, index: int) -> schema.Config:
         """Build the config of one point. It is not kept, because a sweep may have a million points."""
         return self.loaded.variant(self.question.settings(index))
 
@@ -135,7 +132,7 @@ class SweepRun:
 
         Raises ConfigError if the folder holds results of another config.
         """
-        refuse_another_config(self.folder, self.loaded.config)
+        runs.refuse_another_config(self.folder, self.loaded.config)
         stored = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
         for chunk in self._stored(Silent().warn):
@@ -161,9 +158,9 @@ class SweepRun:
         reporter = reporter or Silent()
         for key in unread_keys(self):
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
-        make_folder(self.folder.path)
+        files.make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
-            claim(self.folder, self.loaded.config)
+            runs.claim(self.folder, self.loaded.config)
             merge = Merge(self.question, self.loaded.config, self.inverse)
             for chunk in () if work.force else self._stored(reporter.warn):
                 merge.put(chunk, self.places)

@@ -1,7 +1,5 @@
 """Show messages and progress on stderr, with bars on a terminal and otherwise with a line now and then."""
 
-from __future__ import annotations
-
 import bisect
 import contextlib
 import sys
@@ -42,7 +40,7 @@ class Console:
         self._pulse: threading.Event | None = None
         self._lock = threading.RLock()
 
-    def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageLine:
+    def begin(self, stage: str, place: str, expected_s: float | None = None) -> "StageLine":
         line = StageLine(self, stage, place, expected_s)
         with self._lock:
             self.running.append(line)
@@ -56,7 +54,7 @@ class Console:
                     threading.Thread(target=self._talk, args=(self._pulse,), daemon=True).start()
         return line
 
-    def ended(self, line: StageLine, message: str) -> None:
+    def ended(self, line: "StageLine", message: str) -> None:
         with self._lock:
             if line in self.running:
                 self.running.remove(line)
@@ -121,7 +119,7 @@ class Console:
             if time.monotonic() - self._said_at >= MAX_SILENCE_S:
                 self._say("; ".join(line.describe() for line in self._lines()))
 
-    def _lines(self) -> Iterator[StageLine]:
+    def _lines(self) -> "Iterator[StageLine]":
         with self._lock:
             yield from tuple(self.running)
 
@@ -135,7 +133,7 @@ class Console:
         self._live = Live(get_renderable=self._bars, console=Terminal(stderr=True), transient=True)
         self._live.start()
 
-    def _bars(self) -> Table:
+    def _bars(self) -> "Table":
         from rich.progress_bar import ProgressBar
         from rich.table import Table
         from rich.text import Text

@@ -1,7 +1,5 @@
 """Export figures, tables and trajectories as files for other programs, and walks as GIF or MP4."""
 
-from __future__ import annotations
-
 import io
 import re
 import shlex
@@ -16,19 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.problems import suggestion
-from walkerlab.config.schema import Config
+from walkerlab.config import problems, schema
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.extensions import code_by_word, load
 from walkerlab.labels import add_unit, join_words
-from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan import graph, resolve
 from walkerlab.pipeline.plan.planner import Planner, command, refusing_older, results_in, results_to_show, the_result
-from walkerlab.pipeline.plan.resolve import warn_of_edits
 from walkerlab.pipeline.plan.results import FolderResults
-from walkerlab.pipeline.store.artifact import Stored
-from walkerlab.pipeline.store.content import Group
-from walkerlab.pipeline.store.files import as_text, csv_text, storing, write_through
-from walkerlab.pipeline.store.runs import RunFolder, config_of, owner_of, read_all, run_named
+from walkerlab.pipeline.store import artifact, content, files, runs
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.figures.style import EXPORT_DPI
@@ -67,7 +60,7 @@ class Target:
         if ending in kinds and ending != kind:
             raise ConfigError(f"--to {kind} contradicts the ending of {output}.", "Leave out --to, or rename the file.")
         path = output or Path(f"{stem}.{kind}")
-        with storing(path):
+        with files.storing(path):
             self.refuse(path, kind)
         return path, kind
 
@@ -78,7 +71,7 @@ class Target:
             raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
         if path.exists() and any(file.exists() and path.samefile(file) for file in self.inputs):
             raise ConfigError(f"{path} is an input of this command.", another)
-        owner = owner_of(path, PIPELINE.names)
+        owner = runs.owner_of(path, graph.PIPELINE.names)
         if owner is not None:
             raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
@@ -90,7 +83,7 @@ def write_file(path: Path, data: bytes, console: Console) -> Path:
     """
     replaced = path.is_file() and path.read_bytes() != data
     try:
-        write_through(path, data)
+        files.write_through(path, data)
     except StorageError as error:
         raise StorageError(error.message, "Name another file with -o.") from error
     if replaced:
@@ -111,17 +104,17 @@ OUTPUTS_ADVICE = "Run it with outputs: [states, energies, forces]."
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
-def run_to_export(run: str, request: Request) -> RunFolder:
+def run_to_export(run: str, request: Request) -> runs.RunFolder:
     """Find a run, and warn if its config file was edited since.
 
     Raises ConfigError if there is no such run.
     """
-    folder = run_named(run, request.runs)
-    warn_of_edits(config_of(folder), folder, request.console.warn)
+    folder = runs.run_named(run, request.runs)
+    resolve.warn_of_edits(runs.config_of(folder), folder, request.console.warn)
     return folder
 
 
-def export_from(folder: RunFolder, what: str, target: Target, model: str, console: Console) -> Path:
+def export_from(folder: runs.RunFolder, what: str, target: Target, model: str, console: Console) -> Path:
     """Write an item of a run to a file and return its path.
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
@@ -160,7 +153,7 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
         console.warn(warning)
     target = replace(target, inputs=tuple(files_read(find_config(config))))
     path, kind = target.choose_file("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
-    return write_file(path, draw_measures(loaded.config.walker, as_text(path.stem), kind), console)
+    return write_file(path, draw_measures(loaded.config.walker, files.as_text(path.stem), kind), console)
 
 
 def hyphenate(words: str) -> str:
@@ -173,14 +166,14 @@ def caption_name(caption: str) -> str:
     return hyphenate(re.split("[,:]", caption)[0])
 
 
-def page_tables(folder: RunFolder) -> dict[str, Table]:
+def page_tables(folder: runs.RunFolder) -> dict[str, Table]:
     """Return the tables of a run's page by short caption or, if two tables share that, by full caption."""
     # Imported here, because exporting a figure needs no page.
     from walkerlab.views.report.blocks import Results
     from walkerlab.views.report.registry import pages_of
 
     planner = plan_run(folder)
-    report = PIPELINE["report"]
+    report = graph.PIPELINE["report"]
     results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
@@ -192,7 +185,7 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     }
 
 
-def find_item(folder: RunFolder, name: str) -> Illustration | Table:
+def find_item(folder: runs.RunFolder, name: str) -> "Illustration | Table":
     """Find a figure or table by name.
 
     Raises ConfigError for an unknown name. Its advice lists the items of the run.
@@ -207,43 +200,43 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     for called in (hyphenate(name), caption_name(name)):
         if called in tables:
             return tables[called]
-    stored, _ = read_all(folder, PIPELINE.names)
+    stored, _ = runs.read_all(folder, graph.PIPELINE.names)
     compared = stored["compare"].summary if "compare" in stored else {}
     names = [illustration.name for illustration in FIGURES if illustration.why_left_out(stored, {}) is None]
     names += [table for table, key in TABLES.items() if key in compared]
     names += tables
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
-    nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
+    nothing = f"{folder.path} has no results yet: {command(folder, graph.PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
     # A user who asks for a figure that does not exist did not mean the one with the most similar number.
-    near = "" if name.startswith("figure-") else suggestion(name, names)
+    near = "" if name.startswith("figure-") else problems.suggestion(name, names)
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
-def plan_run(folder: RunFolder) -> Planner:
+def plan_run(folder: runs.RunFolder) -> Planner:
     """Return a planner with the run's current results, but without stages if the run's config is no longer valid."""
-    config = config_of(folder)
-    stages = () if config is None else PIPELINE.stages
-    planner = Planner(config or Config(), FolderResults(folder, elsewhere=False), stages)
+    config = runs.config_of(folder)
+    stages = () if config is None else graph.PIPELINE.stages
+    planner = Planner(config or schema.Config(), FolderResults(folder, elsewhere=False), stages)
     planner.plan()
     return planner
 
 
-def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Target, console: Console) -> bytes:
+def figure(folder: runs.RunFolder, illustration: "Illustration", kind: str, target: Target, console: Console) -> bytes:
     """Draw a figure as on the page, but at the target's size, and return the file's bytes.
 
     Raises StaleError if its results are missing.
     """
     stored = results_in(folder, illustration.stages)
     run = plan_run(folder)
-    plot = PIPELINE["plot"]
-    inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
+    plot = graph.PIPELINE["plot"]
+    inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, artifact.Stored)}
     available = inputs.keys() | run.left_out.keys()
-    outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in available))
+    outdated, _ = runs.read_all(folder, (name for name in plot.results(run.config) if name not in available))
     with refusing_older(folder, outdated):
         reason = illustration.why_left_out(stored, {})
     if reason is not None:
-        commands = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
+        commands = [command(folder, graph.PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
         advice = f"Run {join_words(commands)} first." if commands else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {reason}.", advice)
     left_out = stored.keys() <= inputs.keys()
@@ -252,13 +245,13 @@ def figure(folder: RunFolder, illustration: Illustration, kind: str, target: Tar
     if outdated:
         console.warn(
             f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn anyway'}: "
-            f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} recomputes them."
+            f"{join_words(sorted(outdated))}; {command(folder, graph.PIPELINE['report'])} recomputes them."
         )
     with refusing_older(folder, outdated):
         return illustration.as_file(inputs, kind, target.width or COLUMN_WIDTHS[target.columns], target.dpi)
 
 
-def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
+def table(folder: runs.RunFolder, name: str, kind: str, console: Console) -> Table:
     """Return a table of the paper's values, as records (csv) or as on the page (tex).
 
     Raises ConfigError for other walkers.
@@ -279,7 +272,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
     return record_table(rows)
 
 
-def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
+def steps_of_walk(folder: runs.RunFolder, model: str, console: Console) -> bytes:
     """Return a CSV file of a walk's steps for `identify --level steps`.
 
     Raises StaleError if the walk takes no step.
@@ -291,16 +284,16 @@ def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
     columns = {name: groups[STEPS][name] for name in ("period_s", "length_m")}
     if TRAJECTORY in groups and "angle" in groups[TRAJECTORY].variables:
         columns["touch_angle_rad"] = touch_angles(groups[STEPS], groups[TRAJECTORY])
-    return csv_text(list(columns), zip(*(values.tolist() for values in columns.values()), strict=True))
+    return files.csv_text(list(columns), zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
+def touch_angles(steps: content.Group, trajectory: content.Group) -> NDArray[np.float64]:
     """Return the angle (steps,) in rad of the leg that touches down at the end of each step. Leg 1 touches first."""
     legs = [np.interp(steps["touch_time_s"], trajectory["time"], leg) for leg in trajectory["angle"].T]
     return np.asarray(np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs))
 
 
-def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
+def trajectory(folder: runs.RunFolder, model: str, kind: str, console: Console) -> bytes:
     """Return a walk over time as CSV (a column per variable and leg) or netCDF.
 
     Raises StaleError if no trajectory is stored.
@@ -327,7 +320,7 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
         elif variable.dims[:1] == ("time",):
             for place, values in enumerate(variable.values.T.tolist()):
                 columns[add_unit(f"{name} {place + 1}", variable.units)] = values
-    return csv_text(list(columns), zip(*columns.values(), strict=True))
+    return files.csv_text(list(columns), zip(*columns.values(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -346,7 +339,7 @@ MAX_GIF_RATE = 50
 """Maximum frame rate (frames per second). Browsers show a frame shorter than 20 ms for 100 ms."""
 
 
-def walk_in(folder: RunFolder, model: str | None = None) -> str:
+def walk_in(folder: runs.RunFolder, model: str | None = None) -> str:
     """Return `model`. If it is None, choose contact-sim, or simulate if only that has run.
 
     Raises ConfigError if the stage `model` simulates no walk.
@@ -360,7 +353,7 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
     return model or (rigid if alone else contact)
 
 
-def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
+def write_film(folder: runs.RunFolder, target: Target, film: Film, console: Console) -> Path:
     """Draw a run's walk and write the animation.
 
     Raises ConfigError for an unknown format, StaleError if no walk can be drawn, StorageError if writing fails.

@@ -1,7 +1,5 @@
 """Commands about stored results, configs and extensions: status, show, diff, schema, extensions, clean."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 from dataclasses import replace
@@ -130,13 +128,13 @@ def diff(
     print_result(request, comparison_object(folders, comparison, figures), output)
 
 
-def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
+def run_labels(folders: "tuple[RunFolder, RunFolder]") -> tuple[str, str]:
     """Return labels of two runs: their names or, if these are equal, their folders."""
     first, second = folders
     return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
 
 
-def draw_both(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
+def draw_both(folders: "tuple[RunFolder, RunFolder]", results: list[dict[str, Any]]) -> list[Path]:
     """Draw the walks of both runs overlaid, store the images in the figures folder of the first, and return their
     paths."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
@@ -153,7 +151,7 @@ def draw_both(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]
 
 
 def comparison_object(
-    folders: tuple[RunFolder, RunFolder], found: RunDifference, figures: list[Path]
+    folders: "tuple[RunFolder, RunFolder]", found: "RunDifference", figures: list[Path]
 ) -> dict[str, Any]:
     return {
         "stage": "diff",
@@ -167,7 +165,7 @@ def comparison_object(
 
 
 def comparison_lines(
-    folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
+    folders: "tuple[RunFolder, RunFolder]", comparison: "RunDifference", figures: list[Path], every: bool
 ) -> list[str]:
     """Describe changed config keys, and changed values of the stages: headline values or, if `every` is true, all."""
     from walkerlab.views.report.numbers import number
@@ -198,13 +196,13 @@ def comparison_lines(
     return [*result, *more, *(f"figure: {path}" for path in figures[1:])]
 
 
-def differs(pair: Pair) -> bool:
+def differs(pair: "Pair") -> bool:
     if pair.change is not None:
         return abs(pair.change) > SAME_CHANGE
     return bool(pair.first != pair.second)
 
 
-def percent(pair: Pair) -> str:
+def percent(pair: "Pair") -> str:
     """Format a relative change in percent, or return '' for error measures and for values at rounding level."""
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""

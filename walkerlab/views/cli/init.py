@@ -5,12 +5,7 @@ import shlex
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.files import DEFAULT, builtin_names
-from walkerlab.config.loader import load, safe_name
-from walkerlab.config.problems import explain_missing_feature, suggestion
-from walkerlab.config.reference import as_json_schema
-from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.config.writer import commented_keys, to_commented_yaml
+from walkerlab.config import files, loader, problems, reference, schema, writer
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.pipeline.store.files import make_folder, write_atomically
 
@@ -42,22 +37,22 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """
     builtin = template(walker)
-    config = load(Path(builtin)).config
+    config = loader.load(Path(builtin)).config
     if file.exists():
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
-    default = Config()
-    untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
-    renamed = config.model_copy(update={"name": safe_name(file.stem), "source": None})
+    default = schema.Config()
+    untouched = [name for name in schema.QUESTIONS if getattr(config, name) == getattr(default, name)]
+    renamed = config.model_copy(update={"name": loader.safe_name(file.stem), "source": None})
     text = f"# yaml-language-server: $schema={SCHEMA}\n"
     if checks:
-        text += f"extends: {builtin}\n{commented_keys(renamed, PRINTED_WITH_GAITS)}{CHECK_TO_FILL_IN}"
+        text += f"extends: {builtin}\n{writer.commented_keys(renamed, PRINTED_WITH_GAITS)}{CHECK_TO_FILL_IN}"
     else:
-        text += to_commented_yaml(renamed, untouched)
+        text += writer.to_commented_yaml(renamed, untouched)
     command = f"`walkerlab {'check' if checks else 'report -c'} {shlex.quote(str(file))}`"
     following = f"fill in what is printed, then {command}" if checks else command
     try:
         make_folder(file.parent)
-        write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
+        write_atomically(file.parent / SCHEMA, json.dumps(reference.as_json_schema(), indent=1).encode() + b"\n")
         write_atomically(file, text.encode())
     except StorageError as error:
         reason = getattr(error.__cause__, "strerror", None) or error.message
@@ -69,12 +64,12 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
 
 def template(walker: str) -> str:
     types: dict[str, str] = {}
-    for name in (DEFAULT, *builtin_names()):
+    for name in (files.DEFAULT, *files.builtin_names()):
         # Several built-in configs have walkers of the same type. The first of them is the template of the type.
-        types.setdefault(load(Path(name)).config.walker.type, name)
-    choices = types | {name: name for name in builtin_names()}
+        types.setdefault(loader.load(Path(name)).config.walker.type, name)
+    choices = types | {name: name for name in files.builtin_names()}
     if walker not in choices:
-        beyond = explain_missing_feature(walker)
-        hint = f"; {beyond}." if beyond else f".{suggestion(walker, choices)}"
+        beyond = problems.explain_missing_feature(walker)
+        hint = f"; {beyond}." if beyond else f".{problems.suggestion(walker, choices)}"
         raise ConfigError(f"there is no walker type {walker!r}{hint}", f"Choose from {', '.join(choices)}.")
     return choices[walker]

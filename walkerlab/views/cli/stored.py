@@ -15,20 +15,8 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.plan.planner import RunSummary, runs_in, survey
 from walkerlab.pipeline.plan.results import UP_TO_DATE, Step
-from walkerlab.pipeline.run.executor import short_reason
-from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.store.artifact import NOT_THERE, Damaged, Stored, read
-from walkerlab.pipeline.store.content import Variable
-from walkerlab.pipeline.store.runs import (
-    CHUNKS,
-    FIGURES_FOLDER,
-    RunFolder,
-    config_of,
-    files_of,
-    remove,
-    remove_if_empty,
-    run_named,
-)
+from walkerlab.pipeline.run import executor, runner
+from walkerlab.pipeline.store import artifact, content, runs
 from walkerlab.views.cli.request import Request, print_result
 from walkerlab.views.report.tables import aligned, describe_summary
 
@@ -44,8 +32,8 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
     Raises ConfigError for an unknown run, and StaleError if its config is unreadable. With `check`, raises
     typer.Exit(5) for a stale, missing or damaged result.
     """
-    folder = request.folder if run is None else run_named(run, request.runs)
-    config = request.resolved if run is None else config_of(folder)
+    folder = request.folder if run is None else runs.run_named(run, request.runs)
+    config = request.resolved if run is None else runs.config_of(folder)
     if config is None:
         raise StaleError(f"{folder.path} has no result with a readable config.", "`walkerlab status` lists all runs.")
     is_selected = run is not None or request.config is not None or request.settings or request.strides is not None
@@ -61,7 +49,9 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         }
         for step in steps
     ]
-    folders = [folder] if listed is None else [RunFolder.open_folder(path) for path in sorted(request.runs.glob("*/"))]
+    folders = (
+        [folder] if listed is None else [runs.RunFolder.open_folder(path) for path in sorted(request.runs.glob("*/"))]
+    )
     working = {place.path: worker for place in folders if (worker := place.worker()) is not None}
     status: dict[str, Any] = {
         "run_dir": str(folder.path),
@@ -104,14 +94,14 @@ def state_of(step: Step) -> str:
 
 def explain_state(step: Step) -> str:
     """Say why a result has its state, or return '' if that needs no explanation."""
-    return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
+    return "" if step.reason in (artifact.NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
 def explain_states(steps: Sequence[Step]) -> Iterator[str]:
     """Explain the state of each stage. If several stages have the same reason, all but the first refer to the first."""
     first: dict[str, str] = {}
     for step in steps:
-        reason = short_reason(explain_state(step)) if step.action == "leave out" else explain_state(step)
+        reason = executor.short_reason(explain_state(step)) if step.action == "leave out" else explain_state(step)
         yield f"as {first[reason]}" if reason in first else reason
         if reason:
             first.setdefault(reason, step.stage.name)
@@ -135,8 +125,8 @@ def print_stored(request: Request, stage: str) -> None:
     step = next(step for step in survey(request.resolved, request.folder, request.graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():
         raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
-    if not isinstance(step.found, Stored):
-        reason = "it does not exist yet" if step.reason == NOT_THERE else step.reason
+    if not isinstance(step.found, artifact.Stored):
+        reason = "it does not exist yet" if step.reason == artifact.NOT_THERE else step.reason
         raise StaleError(f"{path} cannot be shown: {reason}.", f"`walkerlab {stage}` computes it.")
     if step.action != "reuse":
         request.console.warn(f"{path} is out of date: {step.reason}")
@@ -144,10 +134,10 @@ def print_stored(request: Request, stage: str) -> None:
     print_result(request, about | as_json(step.found), [f"{stage}: {path}", *lines(step.found)])
 
 
-def as_json(stored: Stored) -> dict[str, Any]:
+def as_json(stored: artifact.Stored) -> dict[str, Any]:
     """Describe an artifact as JSON, without the values of its arrays."""
 
-    def labels(variable: Variable) -> dict[str, Any]:
+    def labels(variable: content.Variable) -> dict[str, Any]:
         shape = list(variable.values.shape)
         return {
             "dims": list(variable.dims), "shape": shape, "units": variable.units, "long_name": variable.long_name
@@ -168,7 +158,7 @@ def as_json(stored: Stored) -> dict[str, Any]:
     }
 
 
-def lines(stored: Stored) -> list[str]:
+def lines(stored: artifact.Stored) -> list[str]:
     """Describe an artifact in lines: summary, arrays and provenance."""
     result = ["summary", *describe_summary(stored.summary)]
     for path, group in stored.groups.items():
@@ -189,7 +179,7 @@ def lines(stored: Stored) -> list[str]:
     return [*result, "provenance", *describe_summary(facts)]
 
 
-def row(name: str, variable: Variable) -> list[str]:
+def row(name: str, variable: content.Variable) -> list[str]:
     sizes = ", ".join(f"{dim} {size}" for dim, size in zip(variable.dims, variable.values.shape, strict=True))
     return [name, f"({sizes})", variable.units, variable.long_name]
 
@@ -203,10 +193,10 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
     """
     if every:
         names = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
-        folders = [RunFolder(request.runs, name) for name in names]
+        folders = [runs.RunFolder(request.runs, name) for name in names]
     else:
         folders = [request.folder]
-    files_by_folder = {folder: files_of(folder, stages) for folder in folders}
+    files_by_folder = {folder: runs.files_of(folder, stages) for folder in folders}
     files = [path for paths in files_by_folder.values() for path in paths]
     sizes = {path: path.lstat().st_size for path in files}
     where = folders[0].path if len(folders) == 1 else request.runs
@@ -220,8 +210,8 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
         for folder, paths in files_by_folder.items():
             if paths:
                 with folder.locked(not request.no_wait, request.console.note):
-                    remove(folder, paths)
-                remove_if_empty(folder)
+                    runs.remove(folder, paths)
+                runs.remove_if_empty(folder)
     verb = "would be removed" if request.dry_run else "removed"
     lines = [f"{verb}: {line}" for line in file_lines(files, sizes)] or [f"{where}: nothing {verb}"]
     print_result(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
@@ -231,7 +221,9 @@ def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
     """Return a line for each file, but only one line for all figures of a run and for all chunks of a sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:
-        stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES_FOLDER: "*"}.get(path.parent.name, path.name)
+        stem = {runs.CHUNKS: f"{path.stem.rpartition('-')[0]}-*", runs.FIGURES_FOLDER: "*"}.get(
+            path.parent.name, path.name
+        )
         lines.setdefault(str(path.parent / stem), []).append(path)
     return [
         line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
@@ -245,17 +237,19 @@ def rerun_artifact(path: Path, request: Request) -> None:
     Raises ConfigError if the artifact is missing, StaleError if it is damaged or not reproduced.
     """
     try:
-        stored = read(path)
+        stored = artifact.read(path)
     except (FileNotFoundError, NotADirectoryError):
         raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
-    except Damaged as error:
-        advice = f"`walkerlab {path.stem} -c {RunFolder.open_folder(path.parent).quoted_path}` recomputes it."
+    except artifact.Damaged as error:
+        advice = f"`walkerlab {path.stem} -c {runs.RunFolder.open_folder(path.parent).quoted_path}` recomputes it."
         raise StaleError(f"{path} is damaged: {error}.", advice) from None
     stage = stored.identity.stage
     name = path.resolve().parent.name
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
-        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph)
+        report = runner.execute(
+            config, stage, runs.RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph
+        )
     recomputed = report.content
     before = stored.digest()
     after = None if recomputed is None else recomputed.digest()

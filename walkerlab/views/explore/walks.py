@@ -12,11 +12,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import bounds_of, describe_type, leaves, value_at, words_of
-from walkerlab.config.files import config_to_extend
-from walkerlab.config.loader import LoadedConfig, load
-from walkerlab.config.schema import Config
-from walkerlab.config.writer import to_extending_yaml, to_yaml
+from walkerlab.config import fields, files, loader, schema, writer
 from walkerlab.errors import ConfigError, WalkerlabError
 from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.plan.results import MemoryResults
@@ -51,18 +47,18 @@ BISECTIONS: Final = 10
 """Number of bisections in the search for the last valid value of a slider."""
 
 
-def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
+def adjustable(start: schema.Config, config: schema.Config) -> Iterator[dict[str, Any]]:
     """Yield a JSON object for each number, choice and switch of a config that affects a walk.
 
     start   the config before any change, which determines the sliders' ends and the reset values
     config  the config with its changes
     """
-    for path, field in leaves(Config, held=config):
+    for path, field in fields.leaves(schema.Config, held=config):
         key = ".".join(path)
         if path[0] in HIDDEN_KEYS or key in ("walker.type", "contact.units"):
             continue
-        value = value_at(config, path)
-        first = value_at(start, path)
+        value = fields.value_at(config, path)
+        first = fields.value_at(start, path)
         if path == ("slope_rad",):
             key = "slope_deg"
             value = math.degrees(value)
@@ -71,7 +67,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
             unit, meaning = described(config, key)
             shown = {"key": key, "value": value, "start": first, "unit": unit, "meaning": meaning}
             turned = input_of(key, first, unit, field, start)
-            yield shown | {"rank": rank(key, first) if turned else None, "bounds": bounds_of(field)} | turned
+            yield shown | {"rank": rank(key, first) if turned else None, "bounds": fields.bounds_of(field)} | turned
 
 
 def rank(key: str, first: Any) -> int | None:
@@ -84,7 +80,7 @@ def rank(key: str, first: Any) -> int | None:
     return next(places, None)
 
 
-def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
+def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: schema.Config) -> dict[str, Any]:
     """Return the choices or the slider range of a key, or nothing if its value must be typed.
 
     first  value before any change
@@ -92,8 +88,8 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -
     """
     if isinstance(first, bool):
         return {"words": [True, False]}
-    words = words_of(field.annotation)
-    if describe_type(field.annotation) == "word" and len(words) > 1:
+    words = fields.words_of(field.annotation)
+    if fields.describe_type(field.annotation) == "word" and len(words) > 1:
         return {"words": words}
     if not isinstance(first, int | float):
         return {}
@@ -125,7 +121,7 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -
     return {"from": ends[0], "to": ends[1], "log": logarithmic, "whole": whole, "gaits": parameter is not None}
 
 
-def ordinary_size(key: str, unit: str, start: Config) -> float:
+def ordinary_size(key: str, unit: str, start: schema.Config) -> float:
     """Return the typical size that a quantity with this unit has in the walker, or 0 if it is unknown."""
     mass = start.walker.total_mass_kg
     leg = start.walker.leg_length_m
@@ -141,7 +137,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
 
 
 @lru_cache(maxsize=1000)  # called again for every key whenever a slider is released
-def gaits_by(key: str, start: Config) -> Parameter | None:
+def gaits_by(key: str, start: schema.Config) -> Parameter | None:
     """Return the key as a parameter along which gaits can be followed, or None if no model depends on it."""
     try:
         return parameter_of(key, start)
@@ -149,7 +145,7 @@ def gaits_by(key: str, start: Config) -> Parameter | None:
         return None
 
 
-def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
+def last_allowed(parameter: Parameter, start: schema.Config, first: float, end: float) -> float:
     """Return the value closest to a slider's end that is valid together with the config's other values."""
     if parameter.config_at(start, end) is not None:
         return end
@@ -219,7 +215,7 @@ class ExploredConfig:
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
     @property
-    def loaded(self) -> LoadedConfig:
+    def loaded(self) -> loader.LoadedConfig:
         """The config as it is loaded, with its warnings.
 
         Raises ConfigError if it is invalid.
@@ -233,7 +229,7 @@ class ExploredConfig:
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
-def set_arguments(config: Config) -> tuple[str, ...]:
+def set_arguments(config: schema.Config) -> tuple[str, ...]:
     """Return the `--set` texts that turn the built-in paper config into `config`."""
     paper = ExploredConfig(None, (), Path(), {}).loaded.config.model_dump(mode="json")
     values = config.model_dump(mode="json").items()
@@ -327,9 +323,9 @@ def config_text(question: ExploredConfig, name: str) -> str:
 
     Raises ConfigError if the config is invalid.
     """
-    start = config_to_extend(question.config)
+    start = files.config_to_extend(question.config)
     named = replace(question, changes={**question.changes, "name": name})
-    base = load(Path(start)).config
+    base = loader.load(Path(start)).config
     changed = named.loaded.config
     same_type = base.walker.type == changed.walker.type
-    return to_extending_yaml(start, base, changed, name) if same_type else to_yaml(changed)
+    return writer.to_extending_yaml(start, base, changed, name) if same_type else writer.to_yaml(changed)

@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from walkerlab.config.contact import Contact
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.pipeline.store.content import Group
-from walkerlab.views.figures.canvas import add_legend, entry, label_of, label_ticks, panels, power_of_ten
+from walkerlab.views.figures import canvas, style, walks
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION
-from walkerlab.views.figures.walks import TUNE_STAGE, claims_in, redoes_the_procedure
 
 WHITE: Final = "#FFFFFF"
 SKY: Final = "#56B4E9"
@@ -43,7 +41,7 @@ def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
 
 
 def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
-    return [Patch(facecolor=colour, edgecolor=GREY, linewidth=0.3, label=label) for colour, label in kinds]
+    return [Patch(facecolor=colour, edgecolor=style.GREY, linewidth=0.3, label=label) for colour, label in kinds]
 
 
 def outcome_kinds(outcomes: Any) -> list[tuple[str, str]]:
@@ -75,13 +73,13 @@ def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
 
 def axis_of(cells: Group, name: str) -> str:
     variable = cells.variables[name]
-    return label_of(variable.long_name, variable.units)
+    return canvas.label_of(variable.long_name, variable.units)
 
 
 SWING_FACTOR = "swing_factor"
 STANCE_FACTOR = "stance_factor"
 MAP = Need(
-    TUNE_STAGE,
+    walks.TUNE_STAGE,
     "map",
     (SWING_FACTOR, STANCE_FACTOR, "outcome", "steps", "rigid_outcome", "rigid_steps"),
     "no walk was computed",
@@ -94,8 +92,8 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 def draw_starts(results: Results) -> Drawn:
     """Plot a map of starts for each model, coloured by outcome, with contours of the number of steps."""
-    cells = results[TUNE_STAGE]["map"]
-    summary = results[TUNE_STAGE].summary
+    cells = results[walks.TUNE_STAGE]["map"]
+    summary = results[walks.TUNE_STAGE].summary
     across = cells[SWING_FACTOR]
     up = cells[STANCE_FACTOR]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
@@ -103,32 +101,32 @@ def draw_starts(results: Results) -> Drawn:
         place = cells.attrs.get(f"{name}_{SWING_FACTOR}"), cells.attrs.get(f"{name}_{STANCE_FACTOR}")
         if None not in place:
             marks.append(("contact gait" if name == "gait" else "adjusted start", marker, size, face, place))
-    figure, both = panels(3.9, 1, 2, sharex=True, sharey=True)
-    swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
+    figure, both = canvas.panels(3.9, 1, 2, sharex=True, sharey=True)
+    swing, stance = ("link 1", "link 2") if walks.redoes_the_procedure(results) else ("the swing leg", "the stance leg")
     for axes, (model, title) in zip(both, TUNED_MODELS, strict=True):
         steps = cells[f"{model}steps"]
         axes.pcolormesh(across, up, cells[f"{model}outcome"], **OUTCOME_COLOURS, rasterized=True)
         levels = [level for level in STEP_LEVELS if level < int(steps.max())]
         if levels and steps.min() < levels[-1]:
-            axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
+            axes.contour(across, up, steps, levels, colors=style.BLACK, linewidths=0.4)
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
     key = patches(outcome_kinds([cells[f"{model}outcome"] for model, _ in TUNED_MODELS]))
     for label, marker, size, face, (x, y) in marks:
-        mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
+        mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": style.BLACK}
         for axes in both:
             axes.plot([x], [y], **mark, markerfacecolor=face, zorder=5)
-        key.append(entry(label, **mark, markerfacecolor=face))
+        key.append(canvas.entry(label, **mark, markerfacecolor=face))
     both[0].set(xlim=across[[0, -1]], ylim=up[[0, -1]])
-    add_legend(figure, key)
-    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if claims_in(results) else []
+    canvas.add_legend(figure, key)
+    rows = [summary["table2"][name] for name in ("dtheta_1", "dtheta_2")] if walks.claims_in(results) else []
     paper = [abs(row["paper_adams"] / row["ours_rigid"]) for row in rows]
     return figure, (summary["map"], cells.attrs["steps_wanted"], paper)
 
 
 BASIN: Final = "basin"
 CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no walk was computed")
-ATTRACTOR_COLOURS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
+ATTRACTOR_COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.VERMILLION)
 NO_ATTRACTOR: Final = -1
 
 
@@ -146,7 +144,7 @@ def draw_basins(results: Results) -> Drawn:
         extent = (*xlim, *ylim)
         return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
-    figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
+    figure, (left, right) = canvas.panels(3.9, 1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), kinds_of_cells(outcome, attractor, summary))
     left.set_title("(a) outcome")
     # A logarithmic scale has no zero, so walks that are settled from the start have the colour of one step.
@@ -157,16 +155,16 @@ def draw_basins(results: Results) -> Drawn:
         scale = LogNorm(least, max(float(settled.max()), least + 1.0))
         bar = figure.colorbar(draw(right, settled, cmap="viridis_r", norm=scale), ax=right)
         bar.set_label("steps")
-        label_ticks(bar.ax.yaxis)
+        canvas.label_ticks(bar.ax.yaxis)
     else:
         right.text(0.5, 0.9, "no walk settles on a gait", transform=right.transAxes, ha="center")
     x, y = (float(cells.attrs[f"at_{name}"]) for name in plane)
-    gait: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": BLACK, "markerfacecolor": WHITE}
+    gait: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": style.BLACK, "markerfacecolor": WHITE}
     for axes in (left, right):
         axes.plot([x], [y], linestyle="", **gait)
         axes.set(xlim=xlim, ylim=ylim, xlabel=axis_of(cells, plane[0]))
     left.set_ylabel(axis_of(cells, plane[1]))
-    add_legend(figure, [*key, entry("rigid gait of one step", linestyle="", **gait)])
+    canvas.add_legend(figure, [*key, canvas.entry("rigid gait of one step", linestyle="", **gait)])
     rows = enumerate(summary["attractors"])
     reached = [(attractor_name(number, summary["attractors"]), row) for number, row in rows if row["cells"]]
     return figure, (summary, reached)
@@ -210,10 +208,10 @@ PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # error ranges of the colour scales: stiction map, step map
 VERDICT_COLOURS: Final = {
     "fine": SKY,
-    "wrong silently": VERMILLION,
-    "diverges": BLACK,
-    "gives up": ORANGE,
-    "no reference": PALE,
+    "wrong silently": style.VERMILLION,
+    "diverges": style.BLACK,
+    "gives up": style.ORANGE,
+    "no reference": style.PALE,
 }
 
 
@@ -223,7 +221,7 @@ class OverStiffness:
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         self.cells = cells
         self.edges = (edges(cells[STIFFNESS_AXIS]), edges(cells[up]))
-        self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
+        self.figure, (self.left, self.right) = canvas.panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
         for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
             axes.set(
@@ -232,7 +230,7 @@ class OverStiffness:
             axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
-                axis.set_major_formatter(power_of_ten)
+                axis.set_major_formatter(canvas.power_of_ten)
         self.left.set_ylabel(axis_of(cells, up))
 
     def draw(self, axes: Axes, values: NDArray[Any], **look: Any) -> Any:
@@ -258,13 +256,13 @@ def draw_stiction(results: Results) -> Drawn:
     compared = cells["compared"] == 1
     maps.draw(maps.left, outcomes, **OUTCOME_COLOURS)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
-    otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)
-    maps.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
+    otherwise = (style.VERMILLION, "(b) other outcome", ~compared & ~unanswered)
+    maps.draw_errors(compared, SHARP, [(style.BLACK, "", unanswered), otherwise])
     seen = [*outcome_kinds(outcomes), *([otherwise[:2]] if otherwise[2].any() else [])]
-    mark: dict[str, Any] = {"marker": "o", "color": BLACK, "markerfacecolor": WHITE}
+    mark: dict[str, Any] = {"marker": "o", "color": style.BLACK, "markerfacecolor": WHITE}
     for axes in (maps.left, maps.right):
         axes.plot(*PAPER, **mark, markersize=5.0)
-    add_legend(maps.figure, [*patches(seen), entry("paper", linestyle="none", **mark)])
+    canvas.add_legend(maps.figure, [*patches(seen), canvas.entry("paper", linestyle="none", **mark)])
     return maps.figure, (results[MAPS].summary, cells.attrs)
 
 
@@ -278,12 +276,12 @@ def draw_step(results: Results) -> Drawn:
     errors = ("fine", "wrong silently")
     others = [(VERDICT_COLOURS[name], name, verdict == name) for name in VERDICT_COLOURS if name not in errors]
     maps.draw_errors(np.isin(verdict, errors), ROUGH, others)
-    line: dict[str, Any] = {"color": GREY, "linewidth": 0.8}
+    line: dict[str, Any] = {"color": style.GREY, "linewidth": 0.8}
     for axes in (maps.left, maps.right):
         axes.axvline(PAPER[0], **line)
     seen = [names[int(number)] for number in np.unique(cells["verdict"])]
     shown = [Patch(facecolor=VERDICT_COLOURS[name], label=name) for name in seen]
-    add_legend(maps.figure, [*shown, entry("the paper's stiffness", **line)])
+    canvas.add_legend(maps.figure, [*shown, canvas.entry("the paper's stiffness", **line)])
     return maps.figure, (results[MAPS].summary, cells.attrs)
 
 

@@ -11,18 +11,10 @@ from numpy.typing import NDArray
 
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group
+from walkerlab.views.figures import stick_diagram, style
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import (
-    BOLD_WIDTH,
-    FAINT_WIDTH,
-    draw_postures,
-    draw_slope,
-    frame_view,
-    read_sticks,
-)
-from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
 ROBUSTNESS_STAGE: Final = "robustness"
@@ -42,9 +34,9 @@ ACTUATION_PANELS: Final = (
 )
 """Axis label, sweep variable, and whether the axis is logarithmic."""
 ACTUATIONS: Final = {
-    "slope_deg": ("slope", BLACK, "o"),
-    "impulse_N_s": ("push-off", BLUE, "s"),
-    "torque_N_m": ("hip torque", VERMILLION, "^"),
+    "slope_deg": ("slope", style.BLACK, "o"),
+    "impulse_N_s": ("push-off", style.BLUE, "s"),
+    "torque_N_m": ("hip torque", style.VERMILLION, "^"),
 }
 """Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
@@ -87,7 +79,7 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
                 for values in rows_of(group, place, model):
                     panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
         panel.set_ylabel(label)
-    axes[2].axhline(0.0, color=GREY, linewidth=0.7)
+    axes[2].axhline(0.0, color=style.GREY, linewidth=0.7)
     axes[-1].set_xlabel(label_of(axis_text, unit))
     add_legend(figure, [entry(f"{model} model", color=MODEL_COLOURS[model], **LINES[model]) for model in models])
     norms = {model: rows_of(group, PANELS[0][1], model)[0] for model in models}
@@ -139,11 +131,11 @@ def plot_drives(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results:
 def plot_rough_ground(results: Results) -> Drawn:
     """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[ROBUSTNESS_STAGE]
-    sticks = read_sticks(result, "rough_walk/")
+    sticks = stick_diagram.read_sticks(result, "rough_walk/")
     steps = result["rough_steps"]
     across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
-    left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
+    left, bottom, right, top = stick_diagram.frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
     figure = blank(1.6 + 2.0 * LOWER_PANEL_INCHES)
     tall = (figure.get_figwidth() - AXIS_LABEL_INCHES) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
@@ -153,18 +145,20 @@ def plot_rough_ground(results: Results) -> Drawn:
     heights.sharex(walk)
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
     strikes = strikes[strikes < sticks.time.size]
-    draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT_WIDTH)
-    draw_postures(walk, sticks, strikes, BOLD_WIDTH)
-    draw_slope(walk, sticks)
-    heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=GREY)
-    heights.axhline(0.0, color=BLACK, linewidth=0.7)
+    stick_diagram.draw_postures(
+        walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), stick_diagram.FAINT_WIDTH
+    )
+    stick_diagram.draw_postures(walk, sticks, strikes, stick_diagram.BOLD_WIDTH)
+    stick_diagram.draw_slope(walk, sticks)
+    heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=style.GREY)
+    heights.axhline(0.0, color=style.BLACK, linewidth=0.7)
     heights.set(xlabel="horizontal position (m)", ylabel="foothold (mm)")
     draw_shares(share, steps)
     roughest = float(steps["roughness_m"].max())
     models = [str(model) for model in steps["model"]]
     key = [entry(f"{model} model", color=MODEL_COLOURS[model]) for model in models]
     dashed = zip(1e3 * steps["roughness_m"], cycle(DASHES), strict=False)
-    key += [entry(f"{roughness:g} mm", color=BLACK, linestyle=dash) for roughness, dash in dashed]
+    key += [entry(f"{roughness:g} mm", color=style.BLACK, linestyle=dash) for roughness, dash in dashed]
     add_legend(figure, key)
     return figure, (models, roughest, int(sticks.strikes.size), int(steps["steps"].shape[2]))
 

@@ -20,19 +20,9 @@ from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import FAR_EDGE_M, Group, Variable, ground_levels
+from walkerlab.views.figures import illustration, walks
 from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style
-from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
-from walkerlab.views.figures.walks import (
-    JOINTS,
-    NO_STATES,
-    STATE_VARIABLES,
-    STEPS_TAKEN_CONTACT,
-    STEPS_TAKEN_RIGID,
-    TOUCHES,
-    TRAJECTORY,
-    Array,
-)
 
 CYCLE = 2
 """Steps per gait cycle."""
@@ -63,7 +53,10 @@ ROOM_ABOVE = 1.05
 MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
 NO_STEPS = Group(
-    {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
+    {
+        name: Variable(np.zeros(0), ("step",), unit, name)
+        for name, unit in ((walks.TOUCHES, "s"), ("touch_along_m", "m"))
+    }
 )
 
 
@@ -71,16 +64,16 @@ NO_STEPS = Group(
 class Sticks:
     """Joint positions of a walker in m, along the slope (positive downhill) and normal to it."""
 
-    time: Array  # (samples,) s
-    hip: Array  # (samples, 2)
-    feet: Array  # (samples, leg, 2)
-    strikes: Array  # (steps,) times of the heel strikes, s
-    landings: Array  # (1 + steps, 2) positions of the first stance foot and of each landing
+    time: walks.Array  # (samples,) s
+    hip: walks.Array  # (samples, 2)
+    feet: walks.Array  # (samples, leg, 2)
+    strikes: walks.Array  # (steps,) times of the heel strikes, s
+    landings: walks.Array  # (1 + steps, 2) positions of the first stance foot and of each landing
     slope: float  # rad
-    knees: Array | None = None  # (samples, leg, 2); None for straight legs
+    knees: walks.Array | None = None  # (samples, leg, 2); None for straight legs
     radii: tuple[float, float] = (0.0, 0.0)  # radius of each sole's arc, m; `feet` has the lowest points of the soles
-    head: Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
-    ground: Array | None = None  # (points, 2) outline of the ground; None on even ground
+    head: walks.Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
+    ground: walks.Array | None = None  # (points, 2) outline of the ground; None on even ground
     pushes: bool = False  # whether the trailing foot pushes off when the other one lands
     ending: str = ""  # outcome of the walk if it failed, such as fell; otherwise empty
 
@@ -91,7 +84,7 @@ class Sticks:
         return None if late or not self.pushes else 1 - step % 2
 
     @property
-    def top(self) -> Array:
+    def top(self) -> walks.Array:
         """Highest point that is drawn (samples, 2): the torso's centre of mass or, without a torso, the hip."""
         return self.hip if self.head is None else self.head
 
@@ -104,16 +97,16 @@ class Sticks:
     def has_soles(self) -> bool:
         return max(self.radii) > SMALL_FOOT * self.leg_length
 
-    def leg(self, leg: int) -> Array:
+    def leg(self, leg: int) -> walks.Array:
         """Return a leg's line (samples, points, 2) from the hip through any knee to the middle of the sole."""
         joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
         return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
 
-    def sole(self, leg: int) -> Array:
+    def sole(self, leg: int) -> walks.Array:
         """Return the arc of a leg's sole (samples, points, 2)."""
         return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
 
-    def arc(self, leg: int, above: Array, angles: Array) -> Array:
+    def arc(self, leg: int, above: walks.Array, angles: walks.Array) -> walks.Array:
         """Return points of a sole's arc (samples, angles, 2), at angles (rad) from the line through its centre.
 
         The line starts at the joint `above` (samples, 2), which is the knee or the hip.
@@ -124,7 +117,7 @@ class Sticks:
         around = np.cos(angles)[:, None] * down[:, None] + np.sin(angles)[:, None] * ahead[:, None]
         return np.asarray(centre[:, None] + self.radii[leg] * around)
 
-    def project(self, points: Array) -> Array:
+    def project(self, points: walks.Array) -> walks.Array:
         """Convert points in the slope's frame (..., 2) to horizontal and vertical position (m)."""
         s, c = math.sin(self.slope), math.cos(self.slope)
         along = points[..., 0]
@@ -149,7 +142,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
     walker = config["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
 
-    def joints(name: str) -> Array:
+    def joints(name: str) -> walks.Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
 
     slope = float(config["slope_rad"])
@@ -174,7 +167,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
         outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
     landings = np.column_stack((landings, heights))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radii, head, outline,
+        trajectory["time"], hip, joints("foot"), steps[walks.TOUCHES], landings, slope, knees, radii, head, outline,
         pushes, ending,
     )  # fmt: skip
 
@@ -212,7 +205,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def frame_view(points: Array, length: float) -> tuple[float, float, float, float]:
+def frame_view(points: walks.Array, length: float) -> tuple[float, float, float, float]:
     """Return left, bottom, right and top (m) of a view around points (points, 2), with margins relative to `length`."""
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
@@ -236,7 +229,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
 
-def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
+def annotate(axes: Axes, sticks: Sticks, path: walks.Array) -> None:
     """Label the landings with their times. Draw an arrow above `path` (samples, 2) in walking direction, with the
     slope."""
     length = sticks.leg_length
@@ -307,7 +300,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
     return []
 
 
-def draw_cycle(stage: str, results: Results) -> Drawn:
+def draw_cycle(stage: str, results: illustration.Results) -> illustration.Drawn:
     """Draw one gait cycle of a stage's walk on its pads or plane (figures 2 and 6)."""
     result = results[stage]
     sticks = read_sticks(result)
@@ -324,12 +317,16 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
 
 
 FILM_NEEDS = {
-    stage: Need(stage, TRAJECTORY, (*STATE_VARIABLES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)
+    stage: illustration.Need(stage, walks.TRAJECTORY, (*walks.STATE_VARIABLES, *walks.JOINTS), walks.NO_STATES)
+    for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
 """Variables that an animation needs. They include none of steps, because a walk can end in its first step."""
 FIGURE_2, FIGURE_6 = (
-    paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
-    for number, stage, steps_taken in ((2, RIGID_STAGE, STEPS_TAKEN_RIGID), (6, CONTACT_STAGE, STEPS_TAKEN_CONTACT))
+    illustration.paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
+    for number, stage, steps_taken in (
+        (2, RIGID_STAGE, walks.STEPS_TAKEN_RIGID),
+        (6, CONTACT_STAGE, walks.STEPS_TAKEN_CONTACT),
+    )
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
@@ -348,7 +345,7 @@ RELIEF_DEPTH = 0.075
 """Distance of the magnified ground profile below the ground (leg lengths)."""
 
 
-def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
+def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> walks.Array:
     """Return the times (s) of an animation's frames. The last frame of a fall lasts a second, so that it can be seen.
 
     steps   number of steps shown, from the first; None: four or, for a fall, the last four and the fall
@@ -383,7 +380,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     axes.text(0.99, 0.97, f"below: ground heights × {times:g}", color=VERMILLION, **corner)
 
 
-def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
+def moving_lines(sticks: Sticks, at: walks.Array) -> list[walks.Array]:
     """Return lines (times, points, 2) in the picture's plane: both legs, then their soles and the torso, if any."""
     lines = [sticks.leg(leg) for leg in range(2)]
     if sticks.has_soles:
@@ -398,7 +395,7 @@ def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
 
 
 def pictures(
-    sticks: Sticks, at: Array, pads: Group | None = None, other: Sticks | None = None
+    sticks: Sticks, at: walks.Array, pads: Group | None = None, other: Sticks | None = None
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield an RGB frame (height, width, 3) for each time `at` (s).
 

@@ -4,8 +4,6 @@ The colours are those of Okabe and Ito, for colour-blind readers. Overlapping se
 style, so that figures remain readable in greyscale.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -79,7 +77,7 @@ class Look:
 
     label: str
     colour: str
-    style: LineStyleType
+    style: "LineStyleType"
     width: float
     marker: str
     order: int = 3

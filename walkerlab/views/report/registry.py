@@ -6,10 +6,7 @@ Each entry is a function that builds a `Section` from the results, or returns No
 
 import math
 
-from walkerlab.config.drives import drives_of, springs_of
-from walkerlab.config.files import DEFAULT
-from walkerlab.config.schema import Config
-from walkerlab.config.walkers import is_passive_compass, why_rigid_alone
+from walkerlab.config import drives, files, schema, walkers
 from walkerlab.extensions import extensions, load
 from walkerlab.views.report import gaits
 from walkerlab.views.report.blocks import MAIN, Results, Section, SectionMaker
@@ -71,8 +68,8 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     if links is not None:
         main.insert([section.anchor for section in main].index("glossary"), links)
     relation = "After" if results.departures else "Redoes"
-    option = "" if run == DEFAULT else run
-    title = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}"
+    option = "" if run == files.DEFAULT else run
+    title = f"{'Driven' if drives.drives_of(results.config) else 'Passive'} walking: {run}"
     source = results.config.source
     return (
         Page(title, tuple(main), (lead(results.config, run),), MAIN, source, relation, results.pending, option),
@@ -80,13 +77,13 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     )
 
 
-def lead(config: Config, run: str) -> str:
+def lead(config: schema.Config, run: str) -> str:
     """Describe what was run: the walker, its slope and its task."""
-    equations = config.equations if is_passive_compass(config) else ""
+    equations = config.equations if walkers.is_passive_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
     degrees = math.degrees(config.slope_rad)
-    alone = why_rigid_alone(config.walker)
-    acting = drives_of(config), springs_of(config)
+    alone = walkers.why_rigid_alone(config.walker)
+    acting = drives.drives_of(config), drives.springs_of(config)
     return words("lead.scene", config, change, degrees, equations, *acting, alone)
 
 

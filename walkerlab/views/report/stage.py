@@ -7,21 +7,19 @@ from pathlib import Path
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store import artifact, content
 from walkerlab.pipeline.store.artifact import Stored
-from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import storing, write_atomically
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
+from walkerlab.views.report import registry, tables
 from walkerlab.views.report.blocks import MAIN, Results
 from walkerlab.views.report.page import Page, pictures, render
-from walkerlab.views.report.registry import pages_of
 from walkerlab.views.report.sections.closing import TITLES
-from walkerlab.views.report.tables import Table
 
 
 def run(
     config: Config, inputs: Mapping[str, Stored], progress: Progress, folder: Path, left_out: Sequence[LeftOut] = ()
-) -> Content:
+) -> content.Content:
     """Write the report's pages into the run's folder.
 
     Raises StorageError if a page cannot be stored.
@@ -35,9 +33,9 @@ def run(
         "html": MAIN,
         "pages": [page.file for page in written],
         "figures": [picture.title for picture in results.pictures],
-        "tables": [block.caption for block in blocks if isinstance(block, Table)],
+        "tables": [block.caption for block in blocks if isinstance(block, tables.Table)],
     }
-    return Content({artifact.FILES_GROUP: files}, summary)
+    return content.Content({artifact.FILES_GROUP: files}, summary)
 
 
 def write_pages(
@@ -54,7 +52,7 @@ def write_pages(
     failed = frozenset(name for name in names if has_failed(config, name, names))
     plain = Results(config, inputs, (), absent, pending, failed)
     results = replace(plain, pictures=pictures(inputs, folder, numbered=bool(plain.claims)))
-    pages = pages_of(results, folder.name)
+    pages = registry.pages_of(results, folder.name)
     for page in pages:
         write_atomically(folder / page.file, render(page).encode())
     for file in set(TITLES) - {page.file for page in pages}:

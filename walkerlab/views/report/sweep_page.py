@@ -6,15 +6,12 @@ from typing import Any
 
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.headlines import HEADLINES
-from walkerlab.pipeline.store.content import Group
-from walkerlab.pipeline.store.files import write_atomically
-from walkerlab.pipeline.store.runs import RunFolder
+from walkerlab.pipeline.store import content, files, runs
 from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.sweep import Swept
-from walkerlab.views.figures import robustness
+from walkerlab.views.figures import robustness, sweep
 from walkerlab.views.figures.stage import draw as draw_figure
 from walkerlab.views.figures.stage import paths_of
-from walkerlab.views.figures.sweep import choose, illustration, is_number
 from walkerlab.views.report.blocks import Gallery, Picture, Section
 from walkerlab.views.report.numbers import number
 from walkerlab.views.report.page import Page, picture, render
@@ -26,7 +23,7 @@ MAX_ROWS = 200
 """Maximum number of points that the page lists."""
 
 
-def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> tuple[Path, list[Path]]:
+def draw(swept: Swept, folder: runs.RunFolder, names: Sequence[str] = (), against: str = "") -> tuple[Path, list[Path]]:
     """Plot a sweep, write its page, and return the paths of the page and of the figure's files.
 
     names    quantities to plot; if empty, `choose` selects them
@@ -38,25 +35,25 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     check_quantities(group, names)
     if against and against not in question.names:
         check_quantities(group, [against], "--against")
-    quantities = [*names] or [name for name in choose(group, question.names) if name != against]
+    quantities = [*names] or [name for name in sweep.choose(group, question.names) if name != against]
     special = None if names or against else robustness.sweep_illustration(group, question.names)
     if special is None and quantities:
-        special = illustration(group, question.stage, question.names, quantities, against)
+        special = sweep.illustration(group, question.stage, question.names, quantities, against)
     page = folder.path / PAGE
     paths = []
     pictures = []
     if special is not None:
         pictures = [picture(draw_figure(special, {}, folder.path, swept.path.stem), folder.path)]
         paths = [folder.path / path for path in paths_of(swept.path.stem).values()]
-    write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
+    files.write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
     return page, paths
 
 
-def check_quantities(group: Group, names: Sequence[str], option: str = "--show") -> None:
+def check_quantities(group: content.Group, names: Sequence[str], option: str = "--show") -> None:
     """Raise ConfigError if a name is not a quantity of the result."""
     for name in names:
-        if not is_number(group, name):
-            listed = ", ".join(key for key in group.variables if is_number(group, key) and "." not in key)
+        if not sweep.is_number(group, name):
+            listed = ", ".join(key for key in group.variables if sweep.is_number(group, key) and "." not in key)
             raise ConfigError(f"{option} {name} is not a quantity of the result.", f"Choose from {listed}.")
 
 
@@ -111,7 +108,7 @@ def values_summary(values: Sequence[object]) -> str:
     return ", ".join(listed) if len(listed) <= 8 else f"{len(listed)} values, {listed[0]} to {listed[-1]}"
 
 
-def rows(group: Group, question: SweptStage, quantities: Sequence[str]) -> list[tuple[Any, ...]]:
+def rows(group: content.Group, question: SweptStage, quantities: Sequence[str]) -> list[tuple[Any, ...]]:
     """Return table rows of the first points: parameters, quantities, outcome and reason."""
     count = min(len(question), MAX_ROWS)
     places = [question.places(index) for index in range(count)]

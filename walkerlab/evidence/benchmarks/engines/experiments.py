@@ -102,7 +102,7 @@ OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adaptive integrators
 ERROR_GOAL = 1e-5  # stop refining once the error under our law is below this
-SETTLED_CHANGE = 1e-4  # stop refining once the period on an engine's own contact changes by less (relative)
+SETTLED_CHANGE = 1e-4  # stop refining once the period on native contact changes by less (relative)
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
 START_FACTORS = (0.95, 0.99)  # factors applied to the velocities of the gait, for walks from other starts
 TUNING_STEP_S = 2e-5
@@ -113,7 +113,7 @@ SWING_S = 0.48
 RUN_TIMEOUT_S = 120.0  # time limit of a run, after which its process is killed
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-ADAMS_RTOL = 1e-7  # relative tolerance of our walk for comparison with engines' own contact
+ADAMS_RTOL = 1e-7  # relative tolerance of our walk for comparison with the native contact of engines
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
@@ -136,7 +136,7 @@ class Truth:
 def simulate(
     scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None
 ) -> ContactWalkResult:
-    """Simulate the scene with our own solver. If `until_s` is given, sample the state at that time."""
+    """Simulate the scene with our solver. If `until_s` is given, sample the state at that time."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, UNLIMITED_BUDGET, track_energy=False)
     return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 

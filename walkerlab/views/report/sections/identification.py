@@ -204,7 +204,7 @@ def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, An
     changes = [
         f"the {axis_label(row['key'])} by {held[row['key']]}{unit}" for row, unit in zip(estimates, units, strict=True)
     ]
-    return f"If {held['to']}, which is held fixed, was {change} larger, this would change {join_words(changes)}."
+    return f"If {held['to']}, which is held fixed, were {change} larger, this would change {join_words(changes)}."
 
 
 def label_combination(combination: str, keys: Sequence[str]) -> str:
