@@ -11,8 +11,7 @@ from pathlib import Path
 PACKAGE = __name__.partition(".")[0]
 
 # Imports are found by searching the text, because the digest must be computed in milliseconds, without loading a
-# compiler. Each
-# alternative begins with a letter, which `re` finds three times as fast as a word boundary.
+# compiler. Each alternative begins with a letter, which `re` finds three times as fast as a word boundary.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
     r"from(?<=\bfrom)[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
@@ -20,8 +19,8 @@ IMPORT = re.compile(
 )
 
 # The files in these folders do not count as data. In a wheel, the built-in configs are inside the package, but the key
-# of a stage
-# already contains the part of the config that the stage reads. Machine code gives the same results as its sources.
+# of a stage already contains the part of the config that the stage reads. Machine code gives the same results as its
+# sources.
 INPUT_FOLDERS = ("config/builtin", "physics/machine_code")
 
 

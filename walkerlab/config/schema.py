@@ -164,7 +164,7 @@ class Tune(Block):
     cells: int | None = key(
         None,
         "1",
-        "cells of the map along each axis (an axis has the factors of one velocity)",
+        "cells of the map along each axis, which shows the factors of one velocity",
         default_in_words="61 for the paper's compass, 21 for other walkers",
         ge=2,
         le=501,

@@ -73,8 +73,7 @@ def follow(walker_at: rigid_map.WalkerAt, span: ValueSpan, value: float) -> tupl
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
     """Yield, for each branch, the range of slopes on which the ground need not pull on the foot, and the longest range
-    of
-    stable gaits in it.
+    of stable gaits in it.
     """
     for branch in branches:
         # The first monitor of the rigid model is the minimum normal force.

@@ -229,8 +229,7 @@ def single_disturbance_units(subject: ModelUnderTest, config: RobustnessConfig, 
 
 def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, steps: int) -> list[float]:
     """Return the largest disturbance of one sign that the gait survives. For a hip push in the rigid model, add the
-    ground
-    reactions.
+    ground reactions.
     """
     size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
     gait = subject.gait_on_map().split_by_leg()[leg]

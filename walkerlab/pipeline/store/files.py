@@ -3,8 +3,7 @@ checkpoints.
 
 A checkpoint is a journal next to the artifact, from which an interrupted run resumes. The first line is the key of the
 result, and one line follows for each unit of work. Every line has a checksum. Lines are only appended, and an
-incomplete
-last line is dropped.
+incomplete last line is dropped.
 """
 
 import contextlib
@@ -85,8 +84,7 @@ def write_numbered(path: Path, text: str) -> Path:
     """Write a text to a path that does not hold another text, and return this path.
 
     If `path` holds another text, the next free one of `name-2`, `name-3`, ... is used. A file that holds the same text
-    is
-    kept. Raises StorageError if the file cannot be written.
+    is kept. Raises StorageError if the file cannot be written.
     """
     for number in itertools.count(1):
         place = path if number == 1 else path.with_stem(f"{path.stem}-{number}")

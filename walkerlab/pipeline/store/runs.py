@@ -35,8 +35,7 @@ RECORD_BYTES = 1 << 20
 @dataclass(frozen=True)
 class Record:
     """Name and config of a run. They are recorded in the folder, because a result may come from another run and hold
-    the
-    config of that run."""
+    the config of that run."""
 
     run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`

@@ -414,8 +414,7 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
     # Many players show only yuv420p. The MP4 is fragmented, because ffmpeg cannot go back in a pipe to write the index
-    # of
-    # an ordinary MP4.
+    # of an ordinary MP4.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

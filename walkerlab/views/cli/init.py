@@ -31,8 +31,7 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
     """Write a walker's commented config and the schema. If `checks` is true, the config is short and has a printed gait
-    to
-    fill in.
+    to fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """

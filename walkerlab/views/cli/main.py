@@ -23,8 +23,7 @@ from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Reque
 def main() -> None:
     """Run the program with this process's arguments, and exit with its code."""
     # Loaded modules stay until the command ends. It would take longer to search them for garbage again and again than
-    # to
-    # find a gait with compiled code.
+    # to find a gait with compiled code.
     gc.set_threshold(300_000, 50, 100)
     # All matrices are small, so threads that share one would spend more time waiting than computing.
     for name in ONE_THREAD:

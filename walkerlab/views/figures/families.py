@@ -222,8 +222,7 @@ def draw_branches(results: Results) -> Drawn:
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
     """List (parameter value, steps) of the gaits that are born in folds. Of gaits whose labels would overlap, list only
-    the
-    one with the fewest steps.
+    the one with the fewest steps.
     """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [

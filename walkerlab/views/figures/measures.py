@@ -140,8 +140,7 @@ def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """Draw the walker's dimensions, and return the bytes of a file of this kind (svg, pdf, png). Equal walkers and
-    names
-    give equal bytes."""
+    names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
     with figure_style():
         figure = draw_parts(walker) if isinstance(walker, AssembledWalker) else draw_upright(walker)
@@ -150,8 +149,7 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw an upright leg with its dimensions, and the other leg faintly behind it. If the legs differ, each has a
-    panel,
-    with that of the first leg above.
+    panel, with that of the first leg above.
     """
     legs = [measure_leg(each) for each in dict.fromkeys((walker, walker.second))]
     views = [frame_leg(leg) for leg in legs]

@@ -88,8 +88,7 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
 
 def plot_against(group: Group, names: Sequence[str], against: str) -> Figure:
     """Plot each quantity, in a row of its own, over the quantity `against`. If a single parameter varies, join the
-    points
-    in order.
+    points in order.
     """
     x, few = spread(group, against)
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)

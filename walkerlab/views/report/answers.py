@@ -224,8 +224,7 @@ LAST_STEP = (
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
     """Tabulate the last step of each model, the step of the gait and, if there are knees, the last step for each
-    instant of
-    release."""
+    instant of release."""
     steps = []
     for name, step in summary["steps"].items():
         known_errors = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}

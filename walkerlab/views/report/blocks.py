@@ -259,8 +259,7 @@ SectionMaker = Callable[[Results], Section | None]
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
     """Return a decorator for a function that makes a section from the summary of a stage. If the summary is empty or
-    lacks
-    the key `needed`, there is no section.
+    lacks the key `needed`, there is no section.
     """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:

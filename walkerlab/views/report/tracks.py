@@ -94,7 +94,7 @@ def track_in(trajectory: Group | None) -> Track | None:
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
-    """Integrate how far a foot has slipped since it last touched down (m). It is zero in the air."""
+    """Return how far (m) a foot has slipped since it last touched down, or zero while the foot is in the air."""
     sliding = np.where(touching, velocity, 0.0)
     way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
     begins = touching & ~np.concatenate(([False], touching[:-1]))
@@ -103,5 +103,6 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Return the time between samples (s), in proportion to the leg's pendulum time: small walkers move faster."""
+    """Return the time between samples (s), in proportion to the leg's pendulum time, because small walkers move
+    faster."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND
