@@ -42,13 +42,15 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     scales = fitted.forecast.scales
     plain = information_from(fitted.evaluation.information, keys, scales, values_count)
     basis = plain.directions[~is_open(plain.singular_values)]
-    result = replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
+    likeliest = basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T
+    freedom = effective_freedom(fitted, plain.freedom, likeliest, basis)
+    result = replace(plain, freedom=freedom, contributions=contributions(fitted, basis))
     groups = fitted.forecast.half_steps
     if not groups.size:
         # A short walk hardly shows whether floor or kicks disturbed it, and both have different effects on the
         # estimates.
         average = average_covariance(fitted, likely_noises(fitted), basis)
-        root = np.linalg.cholesky(basis @ (plain.covariance / np.outer(scales, scales)) @ basis.T)
+        root = np.linalg.cholesky(likeliest)
         inverse = np.linalg.inv(root)
         return replace(result, **scale_covariance(widen(basis.T @ root, inverse @ average @ inverse.T), scales))
     determined = np.eye(fitted.u.size)
@@ -121,18 +123,20 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     )
 
 
-def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
+def effective_freedom(fitted: Fitted, largest: float, likeliest: Floats, basis: Floats) -> float:
     """Return the Satterthwaite degrees of freedom of Student's t for errors along the directions `basis`.
+
+    largest    degrees of freedom if the standard deviations were known
+    likeliest  covariance along the directions at the most likely standard deviations
 
     A short walk determines the standard deviations of floor and measurement poorly. Averaged over their plausible
     values, the covariance is nu / (nu - 2) times as large as at the most likely values, for nu degrees of freedom.
     """
     if not len(basis):
-        return information.freedom
-    likeliest = basis @ (information.covariance / np.outer(information.scales, information.scales)) @ basis.T
+        return largest
     ratio = float(np.trace(np.linalg.solve(likeliest, average_over_plausible_noise(fitted, basis)))) / len(basis)
     # ratio = nu / (nu - 2), solved for nu
-    return min(information.freedom, 2.0 * ratio / (ratio - 1.0)) if ratio > 1.0 else information.freedom
+    return min(largest, 2.0 * ratio / (ratio - 1.0)) if ratio > 1.0 else largest
 
 
 def average_over_plausible_noise(fitted: Fitted, basis: Floats) -> Floats:

@@ -8,7 +8,7 @@ not depend on the number of samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any, Final, NamedTuple
@@ -272,21 +272,6 @@ def estimate_noise(
     best = start
     best_likelihood = -math.inf
     noises = []
-    for noise, likelihood in noise_by_disturbances(rows, floors, leg_length_m, start, earlier):
-        noises.append(noise)
-        if likelihood > best_likelihood + MIN_GAINS[bool(noise.kick)]:
-            best = noise
-            best_likelihood = likelihood
-    return best, tuple(noises)
-
-
-def noise_by_disturbances(
-    rows: Reduced, floors: Floats, leg_length_m: float, start: Noise, earlier: Sequence[Noise]
-) -> Iterator[tuple[Noise, float]]:
-    """Yield the likeliest noise and its likelihood without disturbances, with each kind of disturbance, and with both.
-
-    Each search starts from the likeliest of several noises.
-    """
     units = np.array((leg_length_m, 1.0))
     widest = np.maximum(rows.sizes, 2.0 * floors)
     middle = np.maximum(start.measurement, 2.0 * floors)
@@ -306,8 +291,12 @@ def noise_by_disturbances(
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
         bounds = np.log([np.append(noise, [bound] * len(sources)) for noise, bound in ends]).T
         logs[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
-        noise = noise_at(logs[sources], sources, leg_length_m)
-        yield Noise(noise.measurement, float(noise.roughness_m), float(noise.kick)), likelihood
+        measurement, roughness, kick = noise_at(logs[sources], sources, leg_length_m)
+        noises.append(Noise(measurement, float(roughness), float(kick)))
+        if likelihood > best_likelihood + MIN_GAINS[bool(kick)]:
+            best = noises[-1]
+            best_likelihood = likelihood
+    return best, tuple(noises)
 
 
 def climb(
