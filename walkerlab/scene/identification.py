@@ -455,7 +455,8 @@ def suggest_parameter(
         )
         return
     distance = distance_from_config(keys, fitted)
-    doubted = measured & (distance > NEAR_CONFIG) & (not fitted.forecast.measured.sampled)
+    # Estimates farther away show that the config's values are wrong guesses, unless one change alone explains the walk.
+    doubted = measured & (NEAR_CONFIG < distance < FAR_FROM_CONFIG) & (not fitted.forecast.measured.sampled)
     for index in [each for each in order if gains[each] >= PROMISING_GAIN or doubted[each]][:MAX_FREED]:
         other = others[index]
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
