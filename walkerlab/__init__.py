@@ -20,10 +20,10 @@ EXTENSIONS = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load an exported name, or the list of all of them, on first access."""
+    """Import an exported name on first access. `__all__` is the list of these names."""
     if name.startswith("_") and name != "__all__":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # An import statement would put the API, which no stage needs, into the code digest of every stage.
+    # With an import statement, the code digest of every stage would contain the API, which no stage needs.
     from importlib import import_module
 
     api = import_module(".api", __name__)

@@ -10,16 +10,17 @@ from pathlib import Path
 
 PACKAGE = __name__.partition(".")[0]
 
-# Imports are found by searching the text, because the digest must take milliseconds and load no compiler. Each
-# alternative begins with a letter, which `re` finds three times as fast as a word boundary.
+# Imports are found by searching the text, because the digest must be computed in milliseconds, without loading a
+# compiler. Each alternative begins with a letter, which `re` finds three times as fast as a word boundary.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
     r"from(?<=\bfrom)[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
     r"|import(?<=\bimport)[ \t]+(?P<modules>[\w., \t]+)"
 )
 
-# Folders that do not count as data. In a wheel, the built-in configs are inside the package, but the key of a stage
-# already contains the part of the config that the stage reads. Machine code gives the same results as its sources.
+# The files in these folders do not count as data. In a wheel, the built-in configs are inside the package, but the key
+# of a stage already contains the part of the config that the stage reads. Machine code gives the same results as its
+# sources.
 INPUT_FOLDERS = ("config/builtin", "physics/machine_code")
 
 
@@ -41,7 +42,8 @@ class Sources:
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
     def closure(self, *names: str) -> "list[Module]":
-        """Return modules and all direct and indirect imports from their own packages and this one, sorted by name.
+        """Return modules and everything they import, directly or not, from their own packages and this one, sorted by
+        name.
 
         Raises ModuleNotFoundError if there is no such module.
         """
@@ -96,7 +98,7 @@ class Module:
 
     @cached_property
     def imports(self) -> list[str]:
-        """Full names of modules that this module may import. See `find_imports`."""
+        """Full names of the modules that this module may import, as `find_imports` finds them."""
         return find_imports(self.name, self.is_package, self.text)
 
     @cached_property
@@ -125,7 +127,7 @@ def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
 
 
 def absolute_name(module: str, is_package: bool, origin: str) -> str:
-    """Return the full name of the module in a `from ... import`, which may be relative."""
+    """Return the full name of the module that `from ... import` names, which may be relative to `module`."""
     name = origin.lstrip(".")
     levels = len(origin) - len(name)
     if not levels:
@@ -136,7 +138,7 @@ def absolute_name(module: str, is_package: bool, origin: str) -> str:
 
 
 def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
-    """Return the SHA-256 (hex) of named parts."""
+    """Return the SHA-256 (hex) of texts and their names."""
     digest = hashlib.sha256()
     for name, data in parts:
         digest.update(f"{name}\0{len(data)}\0".encode() + data)

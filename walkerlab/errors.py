@@ -14,11 +14,11 @@ COMMAND_PATTERN: Final = re.compile(
 SLOPES: Final = ("slope_rad", "slope_deg")
 
 CONTROLS: Final = ("Cc", "Cf", "Zl", "Zp")
-"""Categories of control characters in Unicode, with those that change the direction of writing."""
+"""Unicode categories of control characters, including those that change the direction of writing."""
 
 
 def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
-    """Append the options that select the run to every command in a message. `options_of` returns those of a command.
+    """Append the options that select the run to every command in a message. `options_of` returns them for a command.
 
     If the command already sets a key (`--set KEY=VALUE`), other settings of that key are left out.
     """
@@ -42,7 +42,7 @@ def drop_key(options: str, key: str) -> str:
 
 
 def escape_controls(text: str) -> str:
-    """Escape characters that could control a terminal, such as those in a column name of a file from elsewhere."""
+    """Escape characters that could control a terminal. A column name in somebody else's file may contain some."""
     return "".join(
         ascii(letter)[1:-1] if unicodedata.category(letter) in CONTROLS and letter not in "\n\t" else letter
         for letter in text
@@ -50,7 +50,8 @@ def escape_controls(text: str) -> str:
 
 
 class WalkerlabError(Exception):
-    """Failure that the user can act on, with a message about what happened and advice, which may be empty."""
+    """Failure that the user can act on. The message says what happened, and `advice`, which may be empty, what to
+    do."""
 
     exit_code: ClassVar[int] = 1
 
@@ -96,7 +97,7 @@ class StaleError(WalkerlabError):
 
 
 class LockedError(WalkerlabError):
-    """Another process holds the run folder (with `--no-wait`)."""
+    """Another process works in the run folder, and `--no-wait` was given."""
 
     exit_code = 6
 

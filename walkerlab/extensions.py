@@ -2,7 +2,7 @@
 
 The built-in extensions are listed in `walkerlab.EXTENSIONS`. Other packages announce theirs by entry points of the
 group `walkerlab.extensions`. An extension names its code in quotes, "module:name", which is imported on first use. All
-other modules ask this one for what extensions add, so none of them names a module of a higher layer.
+other modules learn from this one what extensions add, so that no module has to name one of a higher layer.
 """
 
 import contextlib
@@ -34,12 +34,13 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "friction": ("coulomb", "none"),
     "hinge_law": ("linear",),
 }
-"""Built-in values of the config keys to which extensions can add values, by the last part of the key. Values of
-`walkers` are those of `walker.type`.
+"""Built-in values of the config keys to which extensions can add values, by the last part of the key. `walkers` stands
+for the key `walker.type`.
 """
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
-"""Positions in the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
-SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again without a new time
+"""Names of the positions in the page at which extensions add sections: after the task, the walks, the models, and
+the accuracy."""
+SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again and keep its time of change
 MAX_FOLDERS: Final = 500
 
 
@@ -48,7 +49,7 @@ class Study:
     """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
 
     own_walker: str  # function that tells whether a config has the walker of the study
-    # functions that give a rigid model other equations, by value of the config key `equations`
+    # functions that build a rigid model with other equations, by value of the config key `equations`
     equations: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -59,8 +60,8 @@ class Extension:
     interface: int  # the `INTERFACE` that it was written for
     stages: Sequence[Any] = ()  # of type `pipeline.plan.stage.Stage`
     figures: str = ""  # a tuple of `views.figures.illustration.Illustration`
-    sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # makers of sections, by `SLOTS` of the page
-    answers: Mapping[str, str] = field(default_factory=dict)  # what a stage's command prints, by stage
+    sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # functions that build sections, by `SLOTS`
+    answers: Mapping[str, str] = field(default_factory=dict)  # functions that print a stage's answer, by stage
     tables: Mapping[str, str] = field(default_factory=dict)  # tables of a stage's summary for export, by stage
     walkers: Mapping[str, str] = field(default_factory=dict)  # types of walkers, by word
     normal_force: Mapping[str, str] = field(default_factory=dict)  # classes of normal-force laws, by word
@@ -96,8 +97,8 @@ class Found:
     name: str
     code: str  # module:name
     source: str  # distribution and version; empty for built-in extensions
-    extension: Extension | None = None  # None if it is left out
-    reason: str = ""  # reason why it is left out
+    extension: Extension | None = None  # None if the extension is left out
+    reason: str = ""  # why the extension is left out; empty if it is used
 
     @property
     def origin(self) -> str:
@@ -105,7 +106,7 @@ class Found:
 
     @property
     def adds(self) -> dict[str, list[str]]:
-        """Names of the stages and of the words of config keys that it adds, and its code for figures and page."""
+        """Added stages and words of config keys, by name, and the code for figures and page."""
         extension = self.extension or Extension(INTERFACE)
         words = {key: [*extension.words(key)] for key in WORDS}
         return {"stages": [stage.name for stage in extension.stages], **words, "views": [*extension.drawing_code()]}
@@ -118,7 +119,7 @@ def load(code: str) -> Any:
 
 
 def lazy_function(code: str) -> Callable[..., Any]:
-    """Return a stand-in for a function, "module:name", that imports it when it is called."""
+    """Return a function that imports the function "module:name" at its first call, and calls it."""
     return lambda *arguments: load(code)(*arguments)
 
 
@@ -128,7 +129,7 @@ opening: list[str] = []
 
 @cache
 def registry() -> tuple[Found, ...]:
-    """Return all extensions, the built-in ones first. Broken ones carry the reason why they are left out."""
+    """Return all extensions, the built-in ones first. For a broken one, `reason` says why it is left out."""
     if opening:
         raise ImportError(f"{opening[0]} imports code that uses extensions; it must name that code in quotes")
     built_in = [Found(name, f"{BUILT_IN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
@@ -141,7 +142,7 @@ def open_extension(found: Found) -> Found:
         extension = load(found.code)
         if found.source:
             check(extension)
-    # Code of other packages can do anything when it is imported, even leave.
+    # Code of other packages can do anything when it is imported, even end the process.
     except (Exception, SystemExit) as error:
         if not found.source:
             raise
@@ -173,7 +174,7 @@ def extensions() -> dict[str, Extension]:
 
 
 def code_by_word(kind: str) -> dict[str, str]:
-    """Return the code that all extensions add, by name. `kind` is a field of `Extension`, or a config key."""
+    """Return the code that all extensions add, by name, in a field `kind` of `Extension` or for a config key `kind`."""
     return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
 
 
@@ -188,7 +189,7 @@ def external_extensions() -> tuple[Found, ...]:
 
 
 def origin_of(key: str) -> str:
-    """Describe which values of a config key come from other packages, or return '' if none do."""
+    """Name the values of a config key that come from other packages, or return '' if none do."""
     origins = (
         (found, word) for found in external_extensions() if found.extension for word in found.extension.words(key)
     )
@@ -196,7 +197,8 @@ def origin_of(key: str) -> str:
 
 
 def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> None:
-    """Raise ConfigError if extensions, or an extension and this package, use the same name. Warn of broken extensions.
+    """Raise ConfigError if two extensions, or an extension and this package, use the same name. Warn of broken
+    extensions.
 
     commands  names of the commands that are not stages
     """
@@ -218,7 +220,7 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
 
 @cache
 def versions() -> str:
-    """Describe the usable extensions of other packages: names, versions and code digests, or return '' without any."""
+    """List the usable extensions of other packages with versions and code digests, or return '' if there are none."""
     sources = Sources()
     described = []
     for found in external_extensions():
@@ -229,7 +231,8 @@ def versions() -> str:
 
 
 def refuse_other_versions(expected: str) -> None:
-    """Raise ConfigError in a worker if its extensions differ from those of the caller, `expected` (see `versions`)."""
+    """Raise ConfigError if the extensions of this worker differ from those of the caller, `expected` (see
+    `versions`)."""
     if expected != versions():
         have = f"this worker has the extensions [{versions()}], and its caller [{expected}]."
         raise ConfigError(have, "Install the same in both environments; `walkerlab extensions` lists them.")
@@ -271,14 +274,14 @@ def scan(folder: str) -> list[list[str]]:
 
     entries = []
     for distribution in distributions(path=[folder]):
-        with contextlib.suppress(Exception):  # other people's damaged files
+        with contextlib.suppress(Exception):  # files of other packages may be damaged
             found = distribution.entry_points.select(group=GROUP)
             entries += [[distribution.name, distribution.version, each.name, each.value] for each in found]
     return sorted(entries)
 
 
 def read_scans(file: Path) -> dict[str, Any]:
-    """Read earlier scans by folder. Return nothing if the file is missing or another user may have written it."""
+    """Read earlier scans by folder. Return {} if the file is missing or another user may have written it."""
     with contextlib.suppress(OSError, ValueError):
         if not may_be_foreign(file):
             stored: dict[str, Any] = json.loads(file.read_text())
@@ -287,7 +290,8 @@ def read_scans(file: Path) -> dict[str, Any]:
 
 
 def write_scans(file: Path, scans: Mapping[str, Any]) -> None:
-    """Store the latest scans of folders that have not just changed. If this fails, the next process scans again."""
+    """Store the latest scans, but not of folders that have just changed. If this fails, the next process scans
+    again."""
     now = time.time_ns()
     settled = {folder: entry for folder, entry in scans.items() if now - entry[0] > SETTLED_NS}
     temporary = file.with_name(f"{file.name}.{os.getpid()}")

@@ -1,4 +1,4 @@
-"""Labels of a result's columns: unit and meaning, declared next to the field that holds the values."""
+"""Unit and meaning of a result's columns, declared next to the fields that hold their values."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ UNITS: Final = {
     "rad_s": "rad/s", "N_s_m": "N s/m", "s_m": "s/m", "N_s": "N s", "Hz": "Hz", "W": "W", "mm": "mm", "kg_m2": "kg m^2",
     "N_m": "N m", "N_m_per_rad": "N m/rad", "N_m_s_per_rad": "N m s/rad",
 }  # fmt: skip
-"""Units by name suffix."""
+"""Units by the suffix of a quantity's name."""
 RIGID_STAGE: Final = "simulate"
 CONTACT_STAGE: Final = "contact-sim"
 """Stages that simulate a walk."""
@@ -21,7 +21,7 @@ ERROR_OF_EACH_STEP: Final = {
     "rolling_m": "rolling_m",
     "knee_strike_times_s": "knee_strike_time_s",
 }
-"""Quantities of each step in the summary of a walk, and their names in `numerical_error`."""
+"""Names in `numerical_error` of the quantities that the summary of a walk has for each step."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Label:
     unit: str  # "1" for pure numbers, "" for text
     text: str  # meaning
     dims: tuple[str, ...] = ()  # dimensions of a row's value; () for a scalar
-    timing: bool = False  # whether it is a measured run time or derived from one
-    absent: float | None = None  # substitute for a missing value, or None to leave it missing
+    timing: bool = False  # whether the value is a measured run time or derived from one
+    absent: float | None = None  # what to store for a missing value; None stores nothing
     name: str = ""  # stored name, if it differs from that of the field
 
 
@@ -51,7 +51,7 @@ def unit_ending(name: str) -> str:
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in the suffix of a name, or '1' if it has none.
+    """Return the unit that the suffix of a name stands for, or '1' if it has none.
 
     In a dotted name, the last part with a unit counts.
     """

@@ -26,7 +26,7 @@ class Outcome(IntEnum):
 
     @property
     def answered(self) -> bool:
-        """Whether the walk has a definite result: a fall is one, a failed solver is not."""
+        """Whether the walk has a definite result. A fall is one, but a failed solver is not."""
         return self not in (Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
 
     @property
@@ -50,8 +50,8 @@ def outcome_of(label: str) -> Outcome | None:
 
 
 class OutcomeWords(NamedTuple):
-    does: str  # predicate for one walker, present tense
-    did: str  # predicate for a number of walks, past tense
+    does: str  # what one walker does, in the present tense
+    did: str  # what a number of walks did, in the past tense
     why: str  # reason why a family of gaits ends with this outcome
     colour: str  # colour on maps: saturated for walking, pale for failures
     advice: str  # meaning of the outcome, and what to try next
@@ -152,4 +152,4 @@ ADVICE_ON_UNEVEN_GROUND = {
     f"{TRY_EVEN_GROUND}",
     Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {TRY_EVEN_GROUND}",
 }
-"""Advice for walks on uneven ground, for the outcomes whose advice differs there."""
+"""Advice by outcome, where it differs on uneven ground."""

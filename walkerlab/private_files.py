@@ -1,4 +1,4 @@
-"""Files that only this user may write, because Python executes their content: compiled code and pickles."""
+"""Keep files that Python executes, compiled code and pickles, where only this user can write."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def may_be_foreign(path: Path) -> bool:
-    """Whether another user, except root, may have written a file or a folder. Links count, as they may lead to one."""
+    """Whether another user, except root, may have written a file or folder. This is assumed of a link."""
     mode = path.lstat().st_mode
     return is_foreign(path) or stat.S_ISLNK(mode) or bool(mode & stat.S_IWOTH)
 
@@ -32,7 +32,8 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder and everything in it, to other users. Delete and return what they may have written.
+    """Close a file, or a folder and everything in it, to other users. Delete what they may have written, and return its
+    paths.
 
     Raises OSError if such a file cannot be deleted.
     """

@@ -169,7 +169,7 @@ def test_unused_labels_may_be_repeated_or_empty(name, tmp_path):
 def test_index_without_a_name_can_be_the_time(tmp_path):
     """The index of a data frame has an empty header cell."""
     text = table(header=("", *HEADER[1:]))
-    with pytest.raises(ConfigError, match="no time column; the first columns are column 1, angle 1"):
+    with pytest.raises(ConfigError, match=r"no time column\. Its first columns are column 1, angle 1"):
         read(tmp_path, "walk.csv", text)
     assert holds_the_walk(read(tmp_path, "walk.csv", text, {"time": "column 1"}, {"time": "s"}))
     counted = table([[str(n), *row] for n, row in enumerate(ROWS)], ("", *HEADER))

@@ -184,7 +184,9 @@ def test_frame_rate_restores_the_true_times_of_a_slow_motion_film(tmp_path):
 
 
 def variable_film():
-    """Times (frames,) and noisy angles of a film whose rate falls from 60 to 30 and 24 frames/s and rises again."""
+    """Return times (frames,) and noisy angles of a film whose rate falls from 60 to 30 and 24 frames/s and
+    rises again.
+    """
     times = [0.0]
     while times[-1] < 7.4 * PERIOD_S:
         slow = 24.0 if times[-1] > 3.0 else 30.0
@@ -194,7 +196,7 @@ def variable_film():
 
 
 def constant_rate(time, fps):
-    """Times of a film that ffmpeg converted to a constant rate, and the frame that it shows at each of them."""
+    """Return the times of a film that ffmpeg converted to a constant rate, and the frame that it shows at each time."""
     converted = np.arange(0.0, time[-1], 1.0 / fps)
     return converted, np.searchsorted(np.floor(fps * time + 0.5), np.arange(converted.size), "right") - 1
 
@@ -271,7 +273,7 @@ def test_part_of_a_recording_can_be_read(tmp_path):
     summary = read(tmp_path, time, angle, from_s=1.0, to_s=4.0)
     assert summary["first_heel_strike_s"] == pytest.approx(2.0 * PERIOD_S, abs=1e-4)
     assert summary["steps"] == 3
-    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s; its times go from 0 to 5\.27 s") as refused:
+    with pytest.raises(ConfigError, match=r"no sample from 9 to inf s: its times go from 0 to 5\.27 s") as refused:
         read(tmp_path, time, angle, from_s=9.0)
     assert "--from-s" in refused.value.advice
 

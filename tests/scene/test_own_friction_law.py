@@ -159,7 +159,7 @@ def test_rigid_limit_reduces_the_creep_of_any_law(own):
     stiff = set_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
     setting = series_settings(STICTION_SERIES)[-1]
-    assert scale_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
+    assert scale_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction_velocity_factor)
     trial = stiff_ground_trial(load().config, START, 0.3714, 2)
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 

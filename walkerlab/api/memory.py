@@ -37,7 +37,7 @@ MADE_HERE: dict[str, tuple[tuple[type[fields.Block], ...], str]] = {
     ),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
-"""Allowed types of arguments that are config blocks, and advice on how to build a block."""
+"""Types of the arguments that are config blocks, and advice on how to build such a block."""
 
 KEYWORD = inspect.Parameter.KEYWORD_ONLY
 P = ParamSpec("P")

@@ -41,9 +41,9 @@ class Result:
     Each value of the summary is also an attribute and an item.
 
     stage      name of the stage
-    summary    values that `--json` prints, in SI units
+    summary    the values that `--json` prints, in SI units
     content    all labelled arrays, by group
-    no_answer  reason if there is no answer, otherwise None
+    no_answer  reason why there is no answer, or None if there is one
     artifact   file of the result; None if it was computed in memory
 
     >>> gait = find_gait()
@@ -62,7 +62,7 @@ class Result:
     artifact: Path | None = None
 
     def __getattr__(self, name: str) -> Value:
-        # Python asks for attributes such as __deepcopy__ before there is a summary, for example to restore a copy.
+        # Python looks up attributes such as __deepcopy__ before there is a summary, for example to restore a copy.
         if name.startswith("_"):
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
         if name not in self._values:
@@ -85,7 +85,8 @@ class Result:
         return {**headline_values(self.stage, self.summary), **self.summary}
 
     def _describe_missing(self, name: str) -> str:
-        """Explain why there is no value of this name, and where there is one."""
+        """Explain that the summary has no value of this name, and name the array or the similar value that was probably
+        meant."""
         start = f"{type(self).__name__} of {self.stage} has no value {name!r}"
         if self.no_answer is not None:
             return f"{start}: {self.no_answer}."
@@ -117,7 +118,7 @@ class Result:
 
     @property
     def advice(self) -> str:
-        """Advice if there is no answer, otherwise empty.
+        """Advice on what to try if there is no answer, otherwise empty.
 
         >>> find_gait(slope_deg=-1).advice.partition(",")[0]
         'Let the slope descend in walking direction (slope_deg above 0)'
@@ -226,7 +227,7 @@ class Gait(Result):
 
 
 RESULTS: dict[str, type[Result]] = {"fixedpoint": Gait}
-"""Result classes of stages whose results have additional properties."""
+"""Class of the results of a stage, where it is not `Result`."""
 
 
 def result_of(

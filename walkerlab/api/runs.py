@@ -1,4 +1,4 @@
-"""Runs in folders, like those of the command line: of a stage, and of a sweep."""
+"""Runs of a stage or a sweep whose results are stored in folders, as on the command line."""
 
 import itertools
 import json
@@ -42,7 +42,7 @@ class Combined(TypedDict, total=False):
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """Folder of stored results.
+    """A folder of stored results.
 
     folder  the run's folder, with its path and its config file
 
@@ -229,7 +229,7 @@ def sweep(
 
 
 def warn(messages: Iterable[str], inside: int = 0) -> None:
-    """Issue warnings that point at the line that called the API. `inside` counts the functions in between."""
+    """Issue warnings that point at the line that called the API, `inside` function calls further out."""
     for text in messages:
         warnings.warn(text, stacklevel=3 + inside)
 
@@ -265,7 +265,7 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
             f"over {key}: {values!r} is neither a list of values nor a range FROM:TO:N.",
             f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
         )
-    return list(itertools.islice(values, MAX_POINTS + 1))  # one value too many is enough for the error
+    return list(itertools.islice(values, MAX_POINTS + 1))  # an iterable may be endless
 
 
 def check_stage(stage: str) -> None:

@@ -19,7 +19,7 @@ _Bounds = tuple[_Bound, ...]  # empty for the default window
 
 
 class Basin(Block):
-    """Grid of starts just after heel strike. Coordinates that the grid does not vary have the gait's values."""
+    """Grid of starts just after heel strike. A coordinate that the grid does not vary keeps its value in the gait."""
 
     model: Literal["rigid", "contact"] = key("rigid", "", "model that is simulated")
     plane: tuple[Coordinate, ...] = key(
@@ -47,7 +47,7 @@ class Basin(Block):
         default_in_words=f"above {_WIDTH}",
     )
     refine: int = key(
-        4, "1", "parts into which cells at basin boundaries are divided along each axis; 1: no refinement", ge=1, le=32
+        4, "1", "parts into which cells at basin boundaries are divided along each axis; 1 for none", ge=1, le=32
     )
     steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
@@ -123,7 +123,7 @@ class Span(_Span):
 class Continuation(Span):
     """Options of `walkerlab continuation`."""
 
-    model: FollowedModel = key("rigid", "", "model whose gaits are followed: rigid, contact, or both on the same axes")
+    model: FollowedModel = key("rigid", "", "model whose gaits are followed: rigid, contact, or both in one figure")
     periods: int = key(16, "1", "period-doubling cascades are followed up to gaits of this many steps", ge=1, le=64)
     points: int = key(400, "1", "maximum number of points on one branch", ge=2, le=100_000)
     second: Span | None = key(None, "", "second parameter, for fold and flip curves in the plane of both")
@@ -157,7 +157,7 @@ class Design(Block):
     keep: Bounds = key(dict, "", "gait quantities to constrain", bounds=f"[A, B] for each of {_QUANTITY_NAMES}")
     model: Literal["rigid", "contact"] = key("rigid", "", "model whose gait is optimised")
     starts: int = key(
-        5, "1", "starting points of the search: the config's own values, the rest at random", ge=1, le=1000
+        5, "1", "starting points of the search: first the config's values, then random ones", ge=1, le=1000
     )
 
     _single_goal = check_against(
@@ -213,7 +213,7 @@ Roughness = Annotated[float, Field(gt=0.0, le=1e3)]
 
 
 class Robustness(Block):
-    """Disturbances and parameters of `walkerlab robustness`."""
+    """Disturbances that `walkerlab robustness` tries, and parameters that it varies."""
 
     model: Literal["rigid", "contact", "both"] | None = key(
         None, "", "model that is simulated", default_in_words="both, or rigid if there is no contact block"
@@ -246,7 +246,7 @@ CASE_NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
 
 
 class Case(Block):
-    """Test case: changes to the paper config, and the expected outcomes."""
+    """Test case: changes of the paper config, and the outcomes that are expected with them."""
 
     name: str = key(
         ..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=CASE_NAME
@@ -255,7 +255,7 @@ class Case(Block):
     model: Literal["contact", "rigid"] = key("contact", "", "model that is simulated")
     config: dict[str, Any] = key(dict, "", "config keys that replace the paper's", bounds="a block of keys")
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
-    lowered_m: float = key(0.0, "m", "depth of the start below the ground; negative: above it", ge=-1e3, le=1e3)
+    lowered_m: float = key(0.0, "m", "depth of the start below the ground, negative if it is above", ge=-1e3, le=1e3)
     expected: tuple[Fate, ...] = key(
         ..., "", "expected outcomes", bounds=f"a list of {', '.join(FATES)}", sequence=True
     )
@@ -265,11 +265,11 @@ class Case(Block):
     agreement: float = key(
         1e-4,
         "1",
-        "largest difference of times from the walk with a ten times tighter tolerance or the twin, in pendulum times",
+        "largest difference of times from those of a ten times tighter tolerance or of the twin, in pendulum times",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
-    twin: bool = key(False, "", "whether the walker scaled to another size must take the same steps")
+    twin: bool = key(False, "", "whether a twin, the walker scaled to another size, must take the same steps")
 
     @field_validator("expected")
     @classmethod
@@ -285,7 +285,7 @@ class Stability(Block):
     cases: tuple[Case, ...] = key(
         (), "", "your own cases, as a list or as a file that holds the list", bounds="a list of cases, or a file"
     )
-    map_cells: int = key(25, "1", "cells along each axis of the maps that --full makes", ge=2, le=201)
+    map_cells: int = key(25, "1", "cells along each axis of the maps that --full computes", ge=2, le=201)
 
 
 Values = str | list[float | int | bool | str]

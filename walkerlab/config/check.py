@@ -36,8 +36,8 @@ class PrintedValue:
     text: str
     real: Digits
     imaginary: Digits | None = None
-    bounds: tuple[float, float] | None = None  # bounds of a range, of a value with an uncertainty, or of 'less than'
-    both_signs: bool = False  # whether the imaginary part has both signs
+    bounds: tuple[float, float] | None = None  # bounds, if a range, an uncertainty or 'less than' is printed
+    both_signs: bool = False  # whether the imaginary part is printed with ±
 
     @property
     def value(self) -> complex:
@@ -53,14 +53,15 @@ def digits_of(text: str) -> Digits:
 
 
 def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
-    """Return how the printed digits follow from the right value: 'rounded', 'cut off', or '' if they do not.
+    """Return how the printed digits follow from the right value, 'rounded' or 'cut off', or '' if they do not follow
+    from it.
 
     error  numerical error of the right value
     """
     if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
         return "rounded"
     longer = abs(right) - abs(printed.value)
-    # A value that is cut off to zero is printed without its sign.
+    # A small negative value that is cut off to zero is printed without its sign.
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
     return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
 
@@ -97,7 +98,7 @@ def parse_printed(text: str) -> PrintedValue | None:
 
 
 def check_readable(text: str) -> str:
-    """Return the text of a printed value if it can be read, otherwise raise an error."""
+    """Validate that the text of a printed value can be read."""
     if len(text) > MAX_PRINTED or parse_printed(text) is None:
         comma = " (decimals follow a point)" if re.search(r"\d,\d", text) else ""
         raise meaning_error(f"is not a printed value{comma}: give {FORMS}, without its unit")
@@ -108,7 +109,7 @@ Printed = Annotated[Text, AfterValidator(check_readable)]
 
 
 class CheckSource(Block):
-    """Publication of a printed gait."""
+    """Publication in which a gait is printed."""
 
     title: Text | None = key(None, "", "title of the paper, thesis or program", bounds="any text")
     authors: Text | None = key(None, "", "its authors", bounds="any text")
@@ -128,7 +129,7 @@ else:
 
 
 class PrintedAngles(_From):
-    """Conventions of the printed angles and rates."""
+    """How the printed angles and rates are to be understood."""
 
     second: Literal["absolute", "relative", "stance-minus-swing"] = key(
         "absolute",
@@ -166,7 +167,7 @@ class PrintedAngles(_From):
 
 
 class Check(Block):
-    """A printed gait for `walkerlab check`. Digits count as they are typed."""
+    """A printed gait for `walkerlab check`. Give its numbers with all their digits, because zeros at the end count."""
 
     source: CheckSource = CheckSource()
     angles: PrintedAngles = PrintedAngles()

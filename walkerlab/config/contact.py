@@ -1,5 +1,5 @@
-"""The blocks `contact` and `ground`: contact laws in N, mm, s as in ADAMS dialogs or in SI, and heights of footholds
-above the slope.
+"""The blocks `contact` (contact laws, in N, mm, s as in ADAMS dialogs or in SI) and `ground` (heights of footholds
+above the slope).
 """
 
 from collections.abc import Mapping
@@ -103,11 +103,12 @@ class Contact(Block):
     @model_validator(mode="before")
     @classmethod
     def _default_quantities_in_si(cls, data: Any) -> Any:
-        """Convert the defaults, so that an omitted key means the same physical quantity in both systems of units."""
+        """Convert the defaults to the block's units, so that an omitted key means the same physical value in both
+        systems."""
         if not isinstance(data, dict) or data.get("units") != "si":
             return data
         exponent = data.get("exponent", 2.2)
-        # An invalid exponent is reported when the schema is checked. Until then any valid one will do.
+        # An invalid exponent is reported when the schema is checked. Until then, any valid one can replace it.
         power = float(exponent) if isinstance(exponent, int | float) and 1.0 <= exponent <= 3.0 else 2.2
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return from_mm(defaults, power) | data
@@ -139,7 +140,7 @@ class Contact(Block):
         return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
-        """Return the one of two units, such as `mm or m`, that belongs to the system of units of this block."""
+        """Return the unit that this block uses, of two such as `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def to_si(self) -> Self:
@@ -156,7 +157,7 @@ class Footholds(Block):
     heights_m: tuple[float, ...] = key(
         (),
         "m",
-        "heights of footholds 1, 2, … above the slope, along its normal; later footholds have the last height",
+        "heights of footholds 1, 2, … above the slope, along the slope's normal; later footholds have the last height",
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 

@@ -10,7 +10,7 @@ from walkerlab.extensions import WORDS, origin_of, words
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
 LINEAR: Final = WORDS["hinge_law"][0]
-# rad/s. Hip torques that could drive nearly massless legs faster are refused, because integration would take forever.
+# rad/s. Hip torques that could swing a leg faster than this are refused, because integration would take forever.
 MAX_LEG_SPEED: Final = 1e4
 
 
@@ -36,13 +36,13 @@ class Hip(Block):
     hinge_law: Literal[words("hinge_law")] = key(  # type: ignore[valid-type]
         LINEAR,
         "",
-        "law of the torques at the hinges, hip and knees, that the parameters belong to; extensions add others",
+        "law of the torques at hip and knees, to which these parameters belong; extensions add others",
         "this project" + origin_of("hinge_law"),
     )
 
     @property
     def parameters(self) -> tuple[float, float, float]:
-        """Parameters of the hinge law, in the order of its arguments."""
+        """Parameters of the hinge law, in the order in which the law takes them."""
         return self.spring_N_m_per_rad, self.damping_N_m_s_per_rad, self.torque_N_m
 
     def too_quick_for(self, inertia: float) -> bool:

@@ -1,5 +1,5 @@
-"""Annotations of config keys (unit, bounds, meaning, source), descriptions of keys and blocks, and the shortest exact
-notation of numbers.
+"""Declaration and description of config keys (unit, bounds, meaning, source), and the shortest exact notation of
+numbers.
 """
 
 import math
@@ -24,7 +24,8 @@ DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
 
 def short_number(number: float) -> str:
-    """Return the shortest text that reads back as the finite `number`, e.g. 3, 0.0174, 1e6. Integers are in full."""
+    """Return the shortest text that reads back as the finite `number`, e.g. 3, 0.0174, 1e6. Integers have all their
+    digits."""
     if isinstance(number, int):
         return str(number)
     plain = repr(number).removesuffix(".0")
@@ -63,7 +64,7 @@ def key(
     unit              printed unit; "1" for pure numbers, "" for other values
     meaning           description, one sentence
     source            origin of the default
-    bounds            description of the allowed values, where `limits` cannot express them
+    bounds            description of the allowed values if `limits` cannot express them
     default_in_words  description of a default that depends on another key
     sequence          whether YAML lists become tuples; implied if the default is a tuple
     limits            pydantic's constraints: gt, ge, lt, le, pattern, ...
@@ -77,7 +78,7 @@ def key(
 
 
 def meaning_error(reason: str) -> PydanticCustomError:
-    """Build the error that a validator raises for a value that is well-typed but wrong."""
+    """Build the error that a validator raises for a value of the right type that is not allowed."""
     return PydanticCustomError("meaning", reason)
 
 
@@ -88,7 +89,7 @@ def _storable(text: str) -> str:
 
 
 Text = Annotated[str, AfterValidator(_storable)]
-"""Text of a user, such as a name or a path."""
+"""Text that a user writes, such as a name or a path."""
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
@@ -105,7 +106,8 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """Return the type of the block that a key holds, the first of several kinds, or None if the key holds a value."""
+    """Return the type of the block that a key holds, or None if the key holds a value. Of several kinds, take the
+    first."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -113,7 +115,8 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """Return the types of block that a key may hold by the block's key `type`, or nothing if there is only one."""
+    """Map each word of the key `type` to the type of block that it selects, or return {} if a key holds only one
+    type."""
     kinds = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
@@ -156,7 +159,7 @@ def value_at(config: Any, path: Iterable[str]) -> Any:
 
 
 def replace_key(block: Any, path: str, value: Any) -> Any:
-    """Return a copy of a block with another value at a dotted path. It is not validated."""
+    """Return a copy of a block with another value, which is not validated, at a path of keys."""
     name, _, tail = path.partition(".")
     return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
 
@@ -190,7 +193,7 @@ def describe_type(annotation: Any) -> str:
 
 
 def words_of(annotation: Any) -> tuple[str, ...]:
-    """Return the words and numbers that a type lists, including those inside a list or union, as text."""
+    """Return, as text, the words and numbers that a type lists as allowed, including those inside a list or union."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return tuple(map(str, parts))

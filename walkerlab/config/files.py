@@ -20,15 +20,15 @@ SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
 STORED_IS_COMPLETE: Final = "every key with its value; a stored config extends nothing"
-read_cached = lru_cache(maxsize=32)(read)  # safe, because callers change only copies of the trees
+read_cached = lru_cache(maxsize=32)(read)  # safe to share, because callers change only copies of the trees
 
 
 @dataclass(frozen=True, slots=True)
 class ConfigFile:
-    """A config file, or the config of a stored run."""
+    """A config file, or a config that is stored with a run."""
 
     path: Path  # path of the file; for a run, the name of its folder
-    label: str  # name in messages
+    label: str  # how messages name it
     text: str | None = None  # config stored with a run or artifact; None to read the file
     changes: tuple[str, ...] = ()  # KEY=VALUE settings that made the run's config from its file
 
@@ -62,7 +62,8 @@ PUBLISHED: Final = Path("published")
 
 
 def find_config(path: Path) -> ConfigFile:
-    """Resolve `--config`, which is an existing path, the name of a built-in config, or that of a published gait."""
+    """Find the config that `--config` names: an existing path, or the name of a built-in config or of a published
+    gait."""
     if not is_file(path):
         if str(path) in builtin_names():
             return builtin_config(str(path))
@@ -98,7 +99,8 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]:
-    """Yield a config file with its block of keys, then the files it extends. Raises the errors of `read_layers`."""
+    """Yield a config file and its block of keys, then the same for each file it extends. Raises the errors of
+    `read_layers`."""
     seen: list[str] = []
     reference: Position | None = None  # position of the file's name in the config that extends it
     while True:
@@ -169,8 +171,8 @@ def _describe_choices() -> str:
 
 
 def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
-    # `reference`, the position of the file's name, and `purpose`, the expected content if not a config, are only for
-    # the error message.
+    # Only the error message uses `reference`, the position of the file's name, and `purpose`, what the file should hold
+    # if it is not a config.
     if file.text is not None:
         return file.text
     kind = "file" if purpose else "config"
@@ -234,7 +236,7 @@ def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
         _refuse_two_slopes(layer.keys)
         # A config that extends another one is another run, so it does not inherit the name.
         lower = merged.copy_without("name")
-        # A slope in degrees replaces one in radians of a lower layer, and the other way round.
+        # A slope in degrees replaces a slope in radians from a lower layer, and the other way round.
         if any(name in layer.entries for name in SLOPE_KEYS):
             lower = lower.copy_without(*SLOPE_KEYS)
         merged = _merge_blocks(lower, layer)
@@ -264,7 +266,7 @@ def parse_setting(text: str) -> ConfigSetting:
 
     Raises ConfigError if it is not KEY=VALUE with a YAML value.
     """
-    # A text with an attribute `source` is of another option than --set, whose name messages must show.
+    # A text with an attribute `source` comes from another option than --set, and messages must name that option.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -298,7 +300,8 @@ def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockN
 
 
 def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
-    """Return a copy of a block with a setting in it. `copies` holds, by id, the copies that earlier settings made."""
+    """Return a copy of a block with a setting applied. `copies` holds, by id, the blocks that earlier settings
+    copied."""
     result = copies.get(id(block)) or block.copy_without()
     copies[id(result)] = result
     name = setting.path[depth]

@@ -1,4 +1,4 @@
-"""Loading a config: a file, `--set` and `--strides` become a typed config with warnings and a run name.
+"""Load a config: turn a file, `--set` and `--strides` into a typed config with warnings and a run name.
 
 A config changed by `--set` runs in its own folder, named after the changed values. The name does not depend on how
 they were typed, so equal experiments share a folder.
@@ -35,11 +35,11 @@ WATER_KG_M3: Final = 1000.0
 class LoadedConfig:
     """A valid config with its origin."""
 
-    config: schema.Config  # resolved config
+    config: schema.Config  # typed config, complete with defaults
     run_name: str  # name of the run's folder inside the runs folder
     # KEY=VALUE of each key that differs from the config's file; earlier changes of a stored run come first
     changes: tuple[str, ...]
-    warnings: tuple[str, ...]  # adjustments and suspicious values, as sentences
+    warnings: tuple[str, ...]  # sentences on adjusted and on suspicious values
     source: str  # name of the config's file in messages
     tree: BlockNode  # untyped tree of the config, with positions
     base_tree: BlockNode  # the same without settings
@@ -50,7 +50,7 @@ class LoadedConfig:
         return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
     def add_position(self, error: ConfigError) -> ConfigError:
-        """Prepend the position of the key at fault to an error's message, if the key is in the config's text."""
+        """Put the position of the key at fault in front of an error's message, if the config's text has this key."""
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
@@ -106,7 +106,7 @@ def load(
     changes = (*(earlier for earlier in file.changes if key_of(earlier) not in keys), *new)
     if changed.name != base.name:
         folder = run_name(changed.name, new)
-    elif file.text is not None and not new:  # an unchanged run keeps its folder, whatever its name
+    elif file.text is not None and not new:  # an unchanged run keeps its folder, however that is named
         folder = file.path.name
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
@@ -124,7 +124,8 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: schema.Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: wrong units, a pitch without pads, a mass not moved with its leg."""
+    """Yield warnings about likely mistakes: wrong units, a pad pitch without pads, a leg mass left in place as the leg
+    grew."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
@@ -175,7 +176,8 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: schema.Config, changed: schema.Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List the keys in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg stands for slope_rad."""
+    """List the keys in which `changed` differs from `base` as KEY=VALUE. If slope_deg is given, it stands for
+    slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
@@ -219,15 +221,16 @@ def _word(value: Any) -> str:
 
 
 def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> schema.Config:
-    """Build the paper config with changes. `lines` are nested keys with values, whose `source` error messages name.
+    """Build the paper config with changes. `lines` has nested keys with values, and `source` is how messages name them.
 
-    A start is moved onto its constraints without a warning. Raises ConfigError if the result is invalid.
+    Values of a start that follow from others are computed without a warning. Raises ConfigError if the result is
+    invalid.
     """
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
 
 def paper_config_with_tree(upper: BlockNode) -> schema.Config:
-    """Build the paper config with a block of keys on top.
+    """Build the paper config with the keys of a block changed.
 
     Raises ConfigError with positions if the result is invalid.
     """

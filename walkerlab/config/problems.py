@@ -16,9 +16,9 @@ SHOWN_PROBLEMS = 20
 @dataclass(frozen=True, slots=True)
 class Problem:
     position: Position | None  # None for a value passed from Python
-    text: str  # description with key and value
-    allowed: str = ""  # valid values; empty if `text` names them
-    nearest: str = ""  # word that was probably meant; empty if nothing is similar
+    text: str  # what is wrong, with key and value
+    allowed: str = ""  # allowed values, or empty if `text` names them
+    nearest: str = ""  # word that was probably meant, or empty if no word is similar
 
     def __str__(self) -> str:
         where = f"{self.position}: " if self.position else ""

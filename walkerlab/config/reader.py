@@ -1,4 +1,4 @@
-"""Parser that converts YAML to trees with positions.
+"""Parse YAML into trees with positions.
 
 ruamel.yaml splits the input. Plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no`
 is a string. Anchors, aliases, tags, duplicate keys, deep nesting and very long input are errors, so that the cost of
@@ -65,7 +65,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
 
     try:
         yield from YAML(typ="safe", pure=True, plug_ins=[]).parse(text)
-    except Exception as error:  # arbitrary input makes the parser fail in many ways, which all mean a bad config
+    except Exception as error:  # the parser fails in many ways on input that is no config
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
@@ -80,7 +80,7 @@ def _position(mark: Any, source: str, column: int) -> Position:
 
 
 class _Composer:
-    """Builder of a tree of limited depth from parser events."""
+    """Builds a tree of limited depth from the parser's events."""
 
     def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
         self._source = source
@@ -128,7 +128,7 @@ class _Composer:
                 self._refuse(word, "a key must be a word, not a list or a block")
             key = self._node(word, depth + 1)
             value = self._node(next(self._events), depth + 1)
-            assert isinstance(key, Scalar), "keys that are lists or blocks are refused"
+            assert isinstance(key, Scalar), "a key that is a list or a block was refused"
             if key.text in block.keys:
                 first = block.keys[key.text]
                 self._twice.append(Problem(key.position, f"{printable(key.text)}: duplicate key, first at {first}"))

@@ -1,7 +1,8 @@
-"""Types for the parts of a config that stages and their helpers may read, which mypy enforces.
+"""Types for the parts of a config that stages and their helpers may read. mypy checks that they read nothing else.
 
 Each type lists its keys, and a config satisfies all types. A stage gets an object with only the keys of its type, and
-their values, as canonical JSON, make up the key of its result. Meaning, unit and bounds of the keys: config/schema.py.
+their values, as canonical JSON, make up the key of its result. config/schema.py defines meaning, unit and bounds of the
+keys.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """Map each key of a type (base classes first) to the type of the part that is read, or to None if all is read."""
+    """Map each key of a type (base classes first) to the type of the part that is read, or to None if it is read
+    completely."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 
@@ -35,7 +37,7 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # Config blocks are not Protocols and are read completely.
+    # A type that is no Protocol is a config block, which is read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
@@ -73,7 +75,7 @@ class RigidConfig(Protocol):
 
 
 class ContactConfig(RigidConfig, Protocol):
-    """Keys that describe the scene of both models."""
+    """Keys that describe the scene, for both models."""
 
     @property
     def push_off(self) -> PushOff: ...
@@ -98,11 +100,11 @@ class WalkConfig(StartConfig, Protocol):
 
 
 class SceneConfig(StartConfig, ContactConfig, Protocol):
-    """Scene of both models, and the start of a walk."""
+    """Keys that describe the scene, for both models, and the start of a walk."""
 
 
 class WalksConfig(WalkConfig, SceneConfig, Protocol):
-    """Scene and every other key that walks of both models depend on."""
+    """All keys on which walks of the two models depend."""
 
     @property
     def solver(self) -> schema.Solvers: ...
@@ -121,7 +123,7 @@ class ContactSolvers(Protocol):
 
 
 class GroundConfig(SceneConfig, Protocol):
-    """Scene, and solver settings of the contact model."""
+    """Keys that describe the scene, and solver settings of the contact model."""
 
     @property
     def solver(self) -> ContactSolvers: ...
@@ -187,7 +189,7 @@ class MapCells(Protocol):
 
 
 class MapsConfig(Protocol):
-    """Keys that `stability-maps` reads. It maps the paper's config."""
+    """Keys that `stability-maps` reads. The maps are of the paper's config."""
 
     @property
     def stability(self) -> MapCells: ...
@@ -275,7 +277,8 @@ def slice_of(config: schema.Config, takes: type | None) -> dict[str, Any]:
 
 
 def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield dotted names and values of nested objects. `lists` also splits lists into items, named by their index."""
+    """Yield dotted names and values of nested objects. If `lists` is true, split lists, too, into items named by their
+    index."""
     for name, value in block.items():
         inner = {str(index): item for index, item in enumerate(value)} if lists and isinstance(value, list) else value
         if isinstance(inner, Mapping):

@@ -36,8 +36,8 @@ class Recorded(Block):
     camera_tilt_deg: Tilt | None = key(
         None,
         "deg",
-        "forward lean from the vertical of the direction from which angles are measured; "
-        "floor: that of the floor's normal, free: found from the recording",
+        "how far the direction from which angles are measured leans forward from the vertical; "
+        "floor: as far as the floor's normal, free: find it from the recording",
         bounds="-45 to 45, floor, free",
         default_in_words="0, or floor if the file's program levels the floor",
     )
@@ -52,7 +52,7 @@ class Recorded(Block):
     fps: float | None = key(
         None,
         "1/s",
-        "frames per second of the film, for files that count frames or state the times of another speed",
+        "frames per second of the film, for files that count frames or whose times are those of another frame rate",
         ge=1e-3,
         le=1e7,
         default_in_words="times as in the file",

@@ -17,9 +17,10 @@ from walkerlab.errors import ConfigError
 TEXT_WIDTH: Final = 79
 SHOWN_KEYS: Final = 4  # largest number of keys that a message suggests
 KIND_SUFFIX: Final = re.compile(r"\([a-z-]+\)")
-"""Pattern for a kind of block in the name of a key, such as `(kneed)`. Only blocks of that kind have the key."""
+"""Pattern for the kind of block in a key's name, such as `(kneed)`, which says that only blocks of that kind have the
+key."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
-EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
+EXTENDS_MEANING: Final = "config to inherit from: a file, relative to this file's folder, or a built-in name"
 
 
 @dataclass(frozen=True, slots=True)

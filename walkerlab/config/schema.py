@@ -51,10 +51,10 @@ class SlopeInDegrees(Block):
     )
 
 
-SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
+SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # if null, -2 phi - theta_2 (both feet on the slope phi)
 StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
-# An angle or rate that follows from the others may be null.
+# An angle or rate that can be computed from the others may be null.
 State = tuple[SwingAngle | None, StanceAngle, Rate, Rate]
 LongState = tuple[Rate | None, ...]  # states of walkers with more bodies than two legs
 
@@ -63,7 +63,7 @@ MID_STEP: Final = "mid-step"
 
 
 class MidStep(BaseModel):
-    """Start between two heel strikes, used without change."""
+    """Start between two heel strikes. Its state is used as it is, without computing any value."""
 
     model_config = Block.model_config
 
@@ -85,7 +85,7 @@ def replace_state(start: Any, state: tuple[float, ...]) -> Any:
 
 
 def kind_of_start(value: Any) -> str:
-    """Return the tag by which pydantic chooses the type of a `start` value: a kind of state, or a word."""
+    """Return the tag by which pydantic chooses the type of a `start` value, which is a state or a word."""
     if isinstance(value, list | tuple):
         return "state" if len(value) <= 4 else "long"
     return MID_STEP if isinstance(value, dict | MidStep) else "word"
@@ -155,7 +155,7 @@ class Solvers(Block):
 
 def factors(least: float, most: float, velocity: str) -> Any:
     bounds = "two numbers from -10 to 10, the first below the second"
-    return key((least, most), "1", f"smallest and largest factor on the {velocity}", bounds=bounds)
+    return key((least, most), "1", f"smallest and largest factor by which the {velocity} is multiplied", bounds=bounds)
 
 
 class Tune(Block):
@@ -164,7 +164,7 @@ class Tune(Block):
     cells: int | None = key(
         None,
         "1",
-        "cells of the map along each of its axes, the factors on the two velocities",
+        "cells of the map along each axis, which shows the factors of one velocity",
         default_in_words="61 for the paper's compass, 21 for other walkers",
         ge=2,
         le=501,
@@ -238,14 +238,14 @@ class Config(Block):
     start: Start = key(
         "fixed-point",
         "rad, rad, rad/s, rad/s",
-        "fixed-point, or the state just after a heel strike: [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
-        "swings, leg 2 stands and a theta_1 of null is computed so that both feet stand on the slope; or a state in "
+        "fixed-point; or the state just after a heel strike, [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
+        "swings and leg 2 stands (null for theta_1 computes it so that both feet stand on the slope); or a state in "
         "mid-step",
         "eq. 11",
         bounds="fixed-point, four numbers (angles up to 2 pi, velocities up to 1e6), or "
         "{instant: mid-step, state: [...]}",
     )
-    strides: int = key(5, "1", "strides to walk, one stride is two steps", ge=1, le=10_000)
+    strides: int = key(5, "1", "strides to walk, of two steps each", ge=1, le=10_000)
     ground: Footholds = Footholds()
     contact: Contact | None = None
     solver: Solvers = Solvers()

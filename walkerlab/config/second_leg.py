@@ -69,7 +69,7 @@ class SecondKneedLeg(Block):
 
 
 class KneelessLeg(SecondStraightLeg):
-    """A second leg without a knee. Keys left out have the values of leg 1 with its knee locked."""
+    """A second leg without a knee. Omitted keys have the values of leg 1 with its knee locked."""
 
     type: Literal["straight-legs"] = key(..., "", "a leg without a knee")
 
@@ -81,7 +81,8 @@ class SecondPushOff(Block):
 
 
 def states_second_leg(config: Any) -> bool:
-    """Whether a config states a second leg or its push-off, or has a type of walker without `leg_2`."""
+    """Whether a config has keys for leg 2 or its push-off. A walker whose type has no `leg_2` counts as one that
+    has."""
     return getattr(config.walker, "leg_2", ...) is not None or config.push_off.leg_2 is not None
 
 

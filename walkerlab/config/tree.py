@@ -23,7 +23,7 @@ class Position:
 
 
 NOWHERE = Position("", 0, 0)
-"""Position of values passed from Python, which no file or option contains."""
+"""Position of values passed from Python, which stand in no file or option."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class ListNode:
 
 @dataclass(frozen=True, slots=True)
 class BlockNode:
-    """Block of keys: `entries` has the value of each key, `keys` the position of the key itself."""
+    """Block of keys. `entries` maps each key to its value, and `keys` to the position of the key itself."""
 
     position: Position
     entries: dict[str, "Node"] = field(default_factory=dict)
@@ -69,7 +69,7 @@ def plain(node: Node) -> Data:
 
 
 def as_typed(node: Node) -> Data:
-    """Convert a node as `plain` does, but keep numbers as text with all their digits."""
+    """Convert a node as `plain` does, but keep numbers as text, as they were typed."""
     if isinstance(node, Scalar):
         return None if node.value is None else node.text
     if isinstance(node, ListNode):

@@ -1,4 +1,4 @@
-"""Validation of a config tree against the schema. All problems are reported together, with positions."""
+"""Validate a config tree against the schema, and report all problems together, with positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -70,7 +70,7 @@ def validate_tree(tree: BlockNode) -> schema.Config:
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
     if isinstance(check := tree.entries.get("check"), BlockNode):
-        # The zeros at the end of a printed value count, but conversion to a number would drop them.
+        # Zeros at the end of a printed value count, but would be lost if the text became a number.
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
     # The schema has only slope_rad. A slope in degrees is validated by another model and then converted.
     if "slope_deg" in data:
@@ -90,7 +90,7 @@ def validate_tree(tree: BlockNode) -> schema.Config:
 
 
 class FollowingValue(NamedTuple):
-    """Value of a start that can be computed from others."""
+    """Value of a start that follows from others."""
 
     name: str
     value: float
@@ -99,7 +99,7 @@ class FollowingValue(NamedTuple):
 
 
 def align_start(config: schema.Config, tree: BlockNode) -> tuple[schema.Config, tuple[str, ...]]:
-    """Compute the values of the start that follow from others, and describe small changes of stated values.
+    """Compute the values of the start that follow from others, and describe how much stated values had to be changed.
 
     Raises ConfigError with a position for a missing value that does not follow, or a stated value that is far off.
     """
@@ -137,7 +137,7 @@ def align_start(config: schema.Config, tree: BlockNode) -> tuple[schema.Config, 
 def following_values(config: schema.Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
     """Return the values of a start that can be computed from others, by index.
 
-    Just after a heel strike both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
+    Just after a heel strike, both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
     for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
     their coupling.
     """
@@ -217,7 +217,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         allowed = f"one of {', '.join(kinds)}{advise_extensions()}"
         return Problem(position, text, allowed, "" if beyond else nearest(word, kinds))
-    # Pydantic inserts the kind of value that it tried into the location, where the config has no key.
+    # Pydantic inserts the kind of value that it tried into the location, although the config has no such key.
     if len(location) > 1 and location[1] in (*kinds, schema.MID_STEP):
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
@@ -248,7 +248,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
 
 
 def advise_extensions() -> str:
-    """Return the advice for a word that an extension may add."""
+    """Return the part of an advice that names extensions, since one of them may add the missing word."""
     names = ", ".join(found.name for found in external_extensions() if found.extension) or "none"
     return f", or a word of an extension: install the one that adds it (installed: {names})"
 
@@ -261,7 +261,7 @@ def _is_later(place: Position, earlier: Position) -> bool:
 def _locate_key(
     model: type[fields.Block], location: Location, tree: BlockNode
 ) -> tuple[list[str], FieldInfo | None, type[fields.Block] | None]:
-    """Return the key and field at a location, and the type of block that the key holds in this tree.
+    """Return the path of the key at a location, its field, and the type of block that it holds in this tree.
 
     Parts of the location below the key (a list item, a kind of value) are ignored.
     """
@@ -313,7 +313,7 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
 def _keys_of_another_kind(
     above: str, entries: BlockNode, source: str, block: type[fields.Block], kinds: dict[str, type[fields.Block]]
 ) -> Problem:
-    """Report all keys from one source that belong to another type of the block."""
+    """Build one problem for all keys from a source (file or option) that belong to another type of the block."""
     foreign_keys = {key for kind_block in kinds.values() for key in kind_block.model_fields} - {*block.model_fields}
     strange = {key: place for key, place in entries.keys.items() if key in foreign_keys and place.source == source}
     where = next(iter(strange.values()))
@@ -331,7 +331,7 @@ def _keys_of_another_kind(
 
 
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
-    """Return the path of the key with the nearest name in any block, or with the same name if `exactly`, or ''."""
+    """Return the path of the key, in any block, whose name is nearest (if `exactly`, equal) to `name`, or ''."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(schema.Config)))}
     # A dotted name is compared with whole paths.
     if "." in name:

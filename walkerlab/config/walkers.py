@@ -62,7 +62,8 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that the foot radius is below `limit`, a function of the value of key `of`. Messages call it `name`."""
+    """Validate that the foot radius is below `limit`, a function of the value of key `of`. Messages call the limit
+    `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
@@ -71,7 +72,7 @@ def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
 def check_inertia(inertia: str, why: str, *places: str) -> Any:
     """Validate that the key `inertia` is not 0 if the mass of the part is at its upper hinge (all keys `places` are 0).
 
-    why  names, for the error message, the part that would be massless
+    why  the part that would be massless, for the error message
     """
 
     def has_inertia(value: float, info: ValidationInfo) -> float:
@@ -83,7 +84,7 @@ def check_inertia(inertia: str, why: str, *places: str) -> Any:
 
 
 class Torso(Block):
-    """An upper body at the hip, kept on the bisector of the legs."""
+    """An upper body that is hinged at the hip and kept on the bisector of the legs."""
 
     mass_kg: float = mass(..., "mass of the torso")
     above_hip_m: float = key(..., "m", "height of its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
@@ -159,7 +160,7 @@ def check_second_leg() -> Any:
     """Validate the keys of `leg_2`: a walker whose legs are both like it must be valid."""
 
     def makes_a_leg(cls: Any, value: Any, info: ValidationInfo) -> Any:
-        # An invalid key is missing here. Its error is reported anyway, and without it no walker can be built.
+        # Invalid keys are missing here and are reported by their own checks. Without them, no walker can be built.
         if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
             try:
                 double_second_leg(cls, info.data, value)
@@ -294,8 +295,8 @@ class KneeJoint(Block):
     release: Literal["compression", "touch"] = key(
         "compression",
         "",
-        "contact model: the trailing knee is released when the leading foot stops sinking in (compression), or at its "
-        "first touch",
+        "instant at which the contact model releases the trailing knee: when the leading foot stops sinking in "
+        "(compression), or at its first touch",
     )
     damping_N_m_s_per_rad: float = key(
         0.0, "N m s/rad", "damping of an unlocked knee; cannot be combined with a damper at the hip", ge=0.0, le=1e9
@@ -320,7 +321,7 @@ class Kneed(_Legged):
         ge=0.0,
     )
     foot_centre_ahead_m: float = offset(
-        0.0, "distance of the arc's centre, or of the point, ahead of the shank's line", MCGEER
+        0.0, "distance of the arc's centre (of the point, if the radius is 0) ahead of the shank's line", MCGEER
     )
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
@@ -365,7 +366,7 @@ class PartHinge(Block):
     parent_point_m: Point = point("hinge position in the parent's frame")
     child: str = name_key("the other body")
     child_point_m: Point = point("hinge position in the child's frame")
-    locks: bool = key(False, "", "whether it is a knee; its parent is then the thigh, its child the shank")
+    locks: bool = key(False, "", "whether the hinge is a knee, whose parent is the thigh and whose child is the shank")
 
 
 class PartParticle(Block):
@@ -378,7 +379,7 @@ class PartParticle(Block):
 
 
 class PartFoot(Block):
-    """A foot: a circular arc around a point of a body."""
+    """A foot: a circular arc whose centre is a point of a body."""
 
     body: str = name_key("the body it belongs to")
     centre_m: Point = point("the arc's centre in the body's frame")
@@ -397,7 +398,7 @@ class AssembledWalker(_Legged):
     """A walker made of parts.
 
     An extension derives a type of walker from this class. The derived class has further keys, properties that make the
-    parts from these keys, `leg_length_m`, and the keys `knee`, `torso` and `hip` of `PartsWalker`.
+    parts from these keys, `leg_length_m`, and the keys `knee`, `torso` and `hip`, as in `PartsWalker`.
     """
 
     if TYPE_CHECKING:
@@ -452,7 +453,7 @@ class PartsWalker(AssembledWalker):
     @classmethod
     def _agrees_with_the_soles(cls, value: float, info: ValidationInfo) -> float:
         if {"hinges", "feet", "legs"} - info.data.keys():
-            return value  # errors of those keys are reported already
+            return value  # those keys are invalid, which is reported already
         length = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
         if length is None or math.isclose(value, length, rel_tol=LEG_LENGTH_DIGITS):
             return value
@@ -463,11 +464,12 @@ class PartsWalker(AssembledWalker):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the sole of upright leg 1 below the hip, or None if hinges do not connect them."""
+    """Return how far (m) the sole of leg 1 is below the hip if the leg is upright, or None if no hinges connect the
+    two."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
-    below, upper = 0.0, 0.0  # m, of the body's upper hinge: depth below the hip, and height above the body's origin
+    below, upper = 0.0, 0.0  # m, depth of the body's upper hinge below the hip, and its height above the body's origin
     for body, lower in pairwise(chain):
         if (body, lower) not in places:
             return None
@@ -503,13 +505,14 @@ def rigid_bodies(walker: Any) -> int:
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Return the coupled angles of the rigid state by index: name of the body, and weights of the angles it follows."""
+    """Map each coupled angle of the rigid state, by index, to the name of its body and the weights of the angles it
+    follows."""
     coupled = {}
     if isinstance(walker, AssembledWalker):
         swinging, stance = walker.legs
         shared = [body.name for body in walker.bodies if body.name not in (*swinging, *stance)]
         place = {name: k for k, name in enumerate((swinging[0], stance[0], *swinging[1:], *shared))}
-        # The parts of the stance leg are locked to each other, so they share its angle.
+        # The parts of the stance leg are locked to each other, so all of them have the angle of the leg.
         place |= dict.fromkeys(stance, 1)
         for coupling in walker.couplings:
             coupled[place[coupling.body]] = (
@@ -597,7 +600,7 @@ def explain_wrong_state(start: Any, walker: Any) -> str:
 
 
 def contact_to_add(walker: Any) -> str:
-    """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
+    """Suggest a contact block in YAML, with the paper's values scaled by mass and a terrain that suits the legs."""
     share = walker.total_mass_kg / CompassWalker().total_mass_kg
     paper = Contact()
     stiffness, damping = (short_number(float(f"{share * value:.3g}")) for value in (paper.stiffness, paper.damping))
@@ -627,7 +630,7 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
 def load_walkers() -> dict[str, type[Block]]:
     """Import the walker types that extensions add, by the word that names each in a config.
 
-    Types that cannot be imported are left out, with a warning.
+    Warns of types that cannot be imported, and leaves them out.
     """
     types = {}
     for word, code in code_by_word("walkers").items():

@@ -33,8 +33,8 @@ def to_extending_yaml(start: str, base: schema.Config, changed: schema.Config, n
 
 
 def slope_in_degrees(slope_rad: float) -> float | None:
-    """Return the slope in degrees if a short number of degrees gives exactly this slope, otherwise None."""
-    # Twelve digits, because the conversion makes 3.0000000000000004 degrees of 3.
+    """Return the slope in degrees if a number with at most 12 digits gives exactly this slope, otherwise None."""
+    # More digits would show rounding: the conversion of 3 degrees to rad and back gives 3.0000000000000004.
     degrees = float(f"{math.degrees(slope_rad):.12g}")
     return degrees if math.radians(degrees) == slope_rad else None
 
@@ -73,7 +73,7 @@ def _commented(block: fields.Block, values: dict[str, Any], indent: str, path: s
             yield f"{indent}{name}:"
             yield from _commented(content, value, f"{indent}  ", f"{path}{name}.")
         elif value is None and fields.block_of(field) is schema.Source:
-            continue  # omit an absent `source`: only a config that reproduces a study has one
+            continue  # an absent `source` is omitted, because only a config that reproduces a study has one
         elif value is None and fields.block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
         elif isinstance(content, tuple) and (listed := fields.block_of(field)) is not None:

@@ -333,7 +333,7 @@ def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
-            f"{recording.path} has no sample from {begin:g} to {end:g} s; its times go from {np.min(time):g} to "
+            f"{recording.path} has no sample from {begin:g} to {end:g} s: its times go from {np.min(time):g} to "
             f"{np.max(time):g} s.",
             "Change --from-s and --to-s.",
         )
@@ -481,7 +481,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     if unit is None:
         raise ConfigError(
             f"--columns: {text!r} adds a constant in {match[4]!r}, which is not a unit of {kind}.",
-            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; quote a name that ends like this: '\"{text}\"'.",
+            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}. Quote a name that ends like this: '\"{text}\"'.",
         )
     column = named_column(recording, match[2].strip())
     if match[1] and LINE.fullmatch(column) and column not in recording.columns:
@@ -548,7 +548,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
         return ConfigError(
-            f"{recording.path} has no time column; the first columns are {there}.",
+            f"{recording.path} has no time column. Its first columns are {there}.",
             'Name it: --columns "time=NAME". For a file that counts frames, state their rate: --fps RATE.',
         )
     markers = [column.removesuffix(".x") for column in recording.columns if column.endswith(".x")]
@@ -616,7 +616,7 @@ def stated_unit(recording: Recording, name: str, source: str, kind: str, units: 
 def unknown_unit_error(recording: Recording, unit: str, name: str, kind: str) -> ConfigError:
     return ConfigError(
         f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
-        f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
+        f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}. Set --units {kind}={SI[kind]}.",
     )
 
 

@@ -674,7 +674,7 @@ READERS: Final[dict[str, Callable[[Path], Recording]]] = {
     ".c3d": read_c3d,
 }
 FORMAT_ADVICE: Final = {
-    ".req": "Request files differ between versions of ADAMS; export .res (RESULTS/XRF) or a table instead.",
+    ".req": "Request files differ between versions of ADAMS. Export .res (RESULTS/XRF) or a table instead.",
     ".xlsx": "Save the sheet as CSV.",
     ".xls": "Save the sheet as CSV.",
     ".mat": "Export the columns as CSV.",

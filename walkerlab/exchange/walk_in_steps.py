@@ -116,10 +116,10 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         touches = touches[1:]  # Leg 1 must swing first, as in computed walks.
     if len(touches) < 2:
         raise ConfigError(
-            f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
+            f"{source} holds no complete step: {len(touches)} heel strikes were found, and the largest angle is "
             f"{float(np.abs(angle).max()):.3g} rad.",
             "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "and over at least one whole step; the slope must be that of the ground (slope_deg).",
+            "and over at least one whole step. The slope must be that of the ground (slope_deg).",
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
@@ -375,7 +375,7 @@ def offset_doubts(
     degrees = np.degrees(errors)
     digit = float(np.diff(np.unique(np.round(angle, 9))).min())
     if after.shift_s or after.lengths_m or after.limps or digit > MAX_SPACING * float(np.abs(errors).max()):
-        cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be the cause"
+        cause = "no constant error of the angles explains it, so a wrong gain, a tilt or coarse digits may be the cause"
     elif alternate:
         cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
     else:

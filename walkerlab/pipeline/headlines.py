@@ -1,4 +1,4 @@
-"""Headline quantities of stages, quantities that a sweep can record, and comparison of two runs by headlines."""
+"""Name the headline quantities of stages and the quantities that a sweep can record, and compare two runs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         *HEADLINES["contact-sim"], *WALK_QUANTITIES, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
-"""All numeric quantities that each of these stages may have at a point of a sweep, in the notation of `HEADLINES`."""
+"""All numbers that a stage may compute at a point of a sweep, written as in `HEADLINES`. Other stages may have any."""
 LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
     "last_step_period_s": "step_periods_s",
     "last_step_length_m": "step_lengths_m",
@@ -78,9 +78,9 @@ LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:
-    """Return the names of a stage's headline quantities in order. For an unlisted stage, its first quantities.
+    """Return the names of a stage's headline quantities in order, or its first quantities if the stage is not listed.
 
-    names  dotted names of all its quantities
+    names  dotted names of all quantities of the stage
     """
     unique = list(dict.fromkeys(names))
     if stage not in HEADLINES:
@@ -95,12 +95,12 @@ def stands_for(entry: str, name: str) -> bool:
 
 
 def has_quantity(stage: str, name: str) -> bool:
-    """Whether a stage may have a quantity of that name. Always true for an unlisted stage."""
+    """Whether a stage may have a quantity of that name. This is true for every name if the stage is not listed."""
     return stage not in QUANTITIES or any(stands_for(entry, name) for entry in QUANTITIES[stage])
 
 
 def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the study's published values with their verdicts, or nothing if the scene departs from the study's.
+    """Return the study's published values with their verdicts, or () if the scene differs from the study's.
 
     compared  summary of `compare`; empty if it has no result
     """
@@ -110,7 +110,7 @@ def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
 
 @dataclass(frozen=True)
 class Pair:
-    """Values of a quantity in two runs, and the change relative to the first (None if undefined)."""
+    """Values of a quantity in two runs, and the change relative to the first value, or None if that is undefined."""
 
     name: str
     first: Any
@@ -123,8 +123,8 @@ class RunDifference:
     """Differences between two runs."""
 
     config: tuple[tuple[str, Any, Any], ...]  # config keys that differ, with both values as JSON
-    numbers: Mapping[str, tuple[Pair, ...]]  # all values of both summaries, for each stage that both runs have
-    headlines: Mapping[str, tuple[Pair, ...]]  # headline quantities, for the same stages
+    numbers: Mapping[str, tuple[Pair, ...]]  # all values of a stage in both runs, by stage
+    headlines: Mapping[str, tuple[Pair, ...]]  # the headline quantities among them, by stage
     # only_first, only_second: stages with a result in one run only
     only_first: tuple[str, ...]
     only_second: tuple[str, ...]

@@ -32,7 +32,7 @@ class StageReporter(Progress, Protocol):
     """Progress of a stage, as the runner reports it."""
 
     def end(self, said: str) -> None:
-        """End the stage with a closing line, which is '' if the stage failed, since its error is reported elsewhere."""
+        """End the stage with a closing line, or with '' if it failed, since its error is reported elsewhere."""
 
 
 class Reporter(Protocol):

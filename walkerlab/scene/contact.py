@@ -1,4 +1,4 @@
-"""Build the contact model of a config with only the parts that the config needs, and starts with scaled velocities."""
+"""Build the contact model of a config, with only the parts that the config needs, and starts with scaled velocities."""
 
 import math
 from collections.abc import Callable
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 
-BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
+BUDGET_PER_STEP = 1_000_000  # maximum number of right-hand sides that are evaluated in a step
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-# radau5, because the derivatives of its steps are exact.
+# The method is radau5, because the derivatives of its steps are exact.
 GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
@@ -65,7 +65,7 @@ def contact_scene(
     """Build the scene of a config with a contact block.
 
     rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
-    own_pitch_m          step length of the contact gait, for `pad_pitch: own`
+    own_pitch_m          step length of the contact gait, needed only for `pad_pitch: own`
     asymmetry            second minus first step length, divided by their mean; the lanes of pads are shifted by it
     """
     contact = require_contact(config)
@@ -94,7 +94,7 @@ def scene_on_pads(
     search: GaitAnswer | None = None,
     asymmetry: float = 0.0,
 ) -> ContactScene:
-    """Build the scene of a config, pads included.
+    """Build the scene of a config and, if necessary, find the contact gait that gives the pitch of its pads.
 
     search  result of an earlier search for the contact gait; None to search if necessary
 
@@ -107,7 +107,7 @@ def scene_on_pads(
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
         pitch = float(search.gait.lengths_m.mean())
         if len(search.gait.steps) > 1:
-            # Pads lie where the feet touch, and these distances differ from those between sections.
+            # Pads lie where the feet touch. The distances between touches differ from those between sections.
             first, second = contact_map.lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)
@@ -126,14 +126,14 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, walkers.Kneed | walkers.AssembledWalker):
         return KneeRules()
     knee = walker.knee
-    # A knee that is free in the rigid model's strike must not stay locked while the leading foot sinks in.
+    # If the knee is free during the rigid model's strike, it must not stay locked here while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
     return KneeRules(normal_force.Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
-# Functions that lay out a terrain, given pitch and asymmetry of the steps. Leg 1 starts a second step behind leg 2.
+# Functions that build a terrain from pitch and asymmetry of the steps. At the start, leg 1 is a step behind leg 2.
 TERRAINS: dict[str, Callable[[float, float], terrain.Terrain]] = {
     "checkerboard": lambda pitch, asymmetry: terrain.checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
     "after-mid-swing": lambda pitch, _: terrain.after_mid_swing(pitch),
@@ -152,7 +152,7 @@ def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_
 
     rigid_step_length_m  initial pad pitch
     """
-    # The pitch is only a start: the search replaces it by the step length of the gait.
+    # This pitch is only the first guess. The search replaces it by the step length of the gait.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)
@@ -160,7 +160,7 @@ def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_
 
 
 def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the gait of the contact model on a plane without pads that lets scuffing feet through."""
+    """Find the gait of the contact model on a plane that has no pads and lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
@@ -183,7 +183,7 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
 
 
 def ground_laws(contact: Contact) -> tuple[Any, Any]:
-    """Return the laws of the normal force and of friction in SI. Frictionless contact is a law, not a zero coefficient.
+    """Return the laws of the normal force and of friction in SI. Frictionless contact has a law of its own.
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
@@ -197,11 +197,11 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     rigid_state  state of the rigid model with both feet on the slope. For a compass it is (theta_1, theta_2, dtheta_1,
                  dtheta_2) with index 1 for the swing leg, 2 for the stance leg
 
-    Position and velocity are first computed with a hinge at the ball foot's centre. Unless the foot is pinned, its
-    velocity is then changed so that it rolls without slip.
+    Position and velocity are first computed with a hinge at the centre of the ball foot. Unless the foot is pinned, the
+    velocity of the foot is then changed so that it rolls without slip.
     """
     walker = scene.walker
-    # In the rigid model the bodies of a straight leg turn as one. Here each of them has an angle.
+    # In the rigid model, the bodies of a straight leg have one angle in common. Here each of them has its own.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -215,7 +215,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> resting.RestingFoot:
     walker = scene.walker
-    # The static penetration is defined under the whole weight, not under its component normal to the slope.
+    # The static penetration is that under the whole weight, not under the component normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 
@@ -229,16 +229,17 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
     }
 
 
-# Tolerances of maps. They give the same map as the config's, except at boundaries between outcomes.
+# Tolerances for maps. They give the same map as the config's tolerances, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
-MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and factor on those of the unchanged start
 
 
 def build_scaled_starts(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build starts with scaled velocities from a rigid start. If the contact gait is known, walks must settle on it."""
+    """Build starts with scaled velocities from a rigid start. If `answer` has a contact gait, walks must settle on
+    it."""
     gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
 
     def start(swing: float, stance: float) -> State:
@@ -258,6 +259,6 @@ def steps_to_settle_on(gait: step_map.Cycle) -> tuple[tuple[float, float], ...]:
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the starts with the solver settings of a map.
 
-    evaluations  right-hand-side evaluations for the unchanged start. The budget of a cell is a multiple of them
+    evaluations  number of right-hand sides that the unchanged start takes. The budget of a cell is a multiple of it
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

@@ -1,4 +1,4 @@
-"""Suggest changes that give a walker a gait: feet ahead of the shanks, or another slope.
+"""Suggest changes with which a walker has a gait: feet ahead of the shanks, or another slope.
 
 For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
 on a few slopes and follows their branches over the slope.
@@ -32,14 +32,14 @@ FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the sha
 
 @dataclass(frozen=True)
 class SlopeRange:
-    """Range of slopes (rad) with gaits, and the part with stable gaits, which is None if no gait is stable."""
+    """Range of slopes (rad) with gaits, and the part of it with stable gaits, or None if no gait is stable."""
 
     slopes: tuple[float, float]
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the end of the range that is nearer to `target`. Use the range of stable gaits
-        if there is one.
+        """Return a slope just inside the end of the range (of the stable gaits, if there are any) that is nearer to
+        `target`.
         """
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
@@ -72,8 +72,8 @@ def follow(walker_at: rigid_map.WalkerAt, span: ValueSpan, value: float) -> tupl
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield, for each branch, the slopes on which the ground need not pull on the foot, with the longest range of
-    stable gaits among them.
+    """Yield, for each branch, the range of slopes on which the ground need not pull on the foot, and the longest range
+    of stable gaits in it.
     """
     for branch in branches:
         # The first monitor of the rigid model is the minimum normal force.
@@ -88,7 +88,8 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
 
 
 def suggest_gaits(scene: reads.RigidConfig) -> str:
-    """Suggest gaits near a scene that has none, as commands, or return '' on slopes that do not descend."""
+    """Suggest commands that find gaits for walkers or slopes near a scene that has none. On slopes that do not descend,
+    return ''."""
     if scene.slope_rad <= 0.0:
         return ""
     config = rigid_config(scene)
@@ -113,7 +114,7 @@ def suggest_gaits(scene: reads.RigidConfig) -> str:
 
 
 def round_inward(low: float, high: float) -> tuple[float, float]:
-    """Round the ends of a range of positive values to three digits inside it, or not at all if it is too narrow."""
+    """Round the ends of a range of positive values inward to three digits, or not at all if the range is too narrow."""
     steps = [10.0 ** (math.floor(math.log10(end)) - 2) for end in (low, high)]
     rounded = math.ceil(low / steps[0]) * steps[0], math.floor(high / steps[1]) * steps[1]
     return rounded if rounded[0] < rounded[1] else (low, high)
@@ -127,7 +128,7 @@ def rigid_config(scene: reads.RigidConfig) -> schema.Config:
 
 
 def find_gait_with_feet_ahead(config: schema.Config) -> tuple[float, fixed_point.RigidGait] | None:
-    """Find how far ahead of the shanks (m) the feet have to be for the most stable gait, and this gait, if any."""
+    """Return how far ahead of the shanks (m) the feet have to be for the most stable gait, and this gait, or None."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).vary(config, rigid_walker)(ahead_m)
@@ -139,7 +140,7 @@ def find_gait_with_feet_ahead(config: schema.Config) -> tuple[float, fixed_point
 def feet_ahead(config: schema.Config) -> tuple[float, ...]:
     if not isinstance(config.walker, walkers.Kneed):
         return ()
-    # Rounded as in the suggested command, so that the command gives the same gait.
+    # The distances are rounded as in the suggested command, so that the command finds the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 

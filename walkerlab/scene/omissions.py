@@ -1,4 +1,4 @@
-"""List computations that the scene of a config makes unnecessary, with reasons and savings.
+"""List the computations that the scene of a config makes unnecessary, with reasons and savings.
 
 The list follows from the config alone, so it is available before anything is loaded or run. scripts/benchmark.py
 measures the savings in time and bytes (docs/performance.md).
@@ -37,7 +37,7 @@ def rigid_walk_omissions(config: "SimulateConfig") -> tuple[Entry, ...]:
 
 
 def stance_omission(config: "RigidConfig") -> Entry:
-    """Describe what the rigid model omits at the stance foot. A compass pivots on a point, other walkers may roll."""
+    """Describe what the rigid model omits at the stance foot. The foot of a compass is a point, but others may roll."""
     if config.walker.type == "compass":
         return omission(
             "floating base, stance contact and foot radius of the rigid walk",
@@ -70,8 +70,8 @@ def contact_walk_omissions(config: "ContactSimConfig") -> tuple[Entry, ...]:
 
 
 def count_step_angles(walker: "Walker") -> int:
-    """Count the angles during a step. A compliant knee stop adds one for the stance shank."""
-    from walkerlab.config.walkers import Kneed, rigid_bodies  # imported late to keep the help fast
+    """Count the angles during a step. With a compliant knee stop, the stance shank also has one."""
+    from walkerlab.config.walkers import Kneed, rigid_bodies  # imported here to keep the help fast
 
     return rigid_bodies(walker) + int(isinstance(walker, Kneed) and walker.knee.lock == "compliant")
 

@@ -1,4 +1,4 @@
-"""Config keys as parameters of families of walkers: unit, value, and the config at other values."""
+"""Use config keys as parameters of families of walkers, with unit, value, and the config at other values."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,18 +37,19 @@ class Parameter:
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: reads.ContactConfig, value: float) -> Config | None:
-        """Return the config at another value, with dependent defaults recomputed, or None if the schema rejects it."""
+        """Return the config at another value, with the defaults that depend on it recomputed, or None if the schema
+        rejects it."""
         return config_with(config, (self,), (value,))
 
     def refusal(self, config: reads.ContactConfig, value: float, key: Key) -> ConfigError:
-        """Build the error, with the reason, for a value that the config key `key` requests and the schema rejects."""
+        """Build the error for a value that the config key `key` requests and the schema rejects, with the reason."""
         why = ""
         try:
             _changed(config, (self,), (value,))
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
-            # The message of the schema would state the limits in radians.
+            # The schema's message would state the limits in radians.
             if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
@@ -82,7 +83,7 @@ def _changed(config: reads.ContactConfig, parameters: Sequence[Parameter], value
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
-            # The block is missing if the second leg is like the first.
+            # A config has no block for a second leg that is like the first.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
@@ -93,7 +94,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: reads.ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
+    """Return the value at a path of keys. If a key of the second leg is omitted, its value is that of the first leg."""
     value = fields.value_at(config, path)
     return fields.value_at(config, first_leg_path(path)) if value is None else value
 
@@ -115,7 +116,7 @@ def _keys_set(value: Any) -> Any:
     if not isinstance(value, fields.Block):
         return value
     keys = value.model_dump(exclude_unset=True)
-    # The type is stated even if it is the default, because it decides which keys a block has.
+    # The type is included even if it is the default, because it decides which keys a block has.
     return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
@@ -129,7 +130,7 @@ def parameter_of(key: str, config: reads.ContactConfig, asker: Key = ()) -> Para
 
     Raises ConfigError if the key is not a number that a model uses.
     """
-    # `asker` is the config key that names this parameter, if any
+    # `asker` is the config key in which this parameter is named, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
@@ -154,7 +155,7 @@ def explain_non_parameter(
     key: str, config: reads.ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
-    # `own` has the keys that exist for the type of walker of this config.
+    # `own` lists the keys that exist for this config's type of walker.
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"

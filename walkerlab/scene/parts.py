@@ -1,4 +1,4 @@
-"""Build the parts of a config's walker, shared by both models: assemblies, from the dimensions of each type of walker.
+"""Build the parts of a walker (an assembly), which both models share, from the dimensions that its type has.
 
 It also finds the laws of ground and hinges that the config names, built-in ones and those of extensions.
 
@@ -29,13 +29,13 @@ UPPER_END = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Limb:
-    """Rigid limb, described from its upper end, SI."""
+    """Rigid limb, with distances (m) from its upper end."""
 
     length_m: float
     mass_kg: float
     mass_below_m: float  # distance of the centre of mass below the upper end
     mass_ahead_m: float = 0.0
-    inertia_kg_m2: float = 0.0  # about the limb's centre of mass
+    inertia_kg_m2: float = 0.0  # about the centre of mass of the limb
 
     def body(self, name: str) -> Body:
         return Body(name, self.mass_kg, (self.mass_ahead_m, -self.mass_below_m), self.inertia_kg_m2)
@@ -43,7 +43,7 @@ class Limb:
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular sole, whose lowest point is level with the leg's lower end. A zero radius makes a point foot."""
+    """Circular sole, whose lowest point is level with the leg's lower end. If the radius is 0, the foot is a point."""
 
     radius_m: float = 0.0
     centre_ahead_m: float = 0.0
@@ -142,7 +142,7 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
 
 
 def hip_mass(walker: walkers.CompassWalker | walkers.StraightLegs, rigid: bool) -> float:
-    """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
+    """Return the hip mass (kg) of a walker with straight legs, or a larger one if the contact model needs it."""
     # On compliant ground, legs that are point masses need a hip mass. Without one, two legs side by side could turn
     # about their masses and move the hip freely, so that no force would determine the acceleration of the hip.
     if rigid:
@@ -171,11 +171,11 @@ class Drives(NamedTuple):
 
     hip: tuple[float, ...]
     push_offs: tuple[float, float]  # N s, of each leg
-    knees: tuple[tuple[float, float, float], ...]  # of each leg; empty without dampers
+    knees: tuple[tuple[float, float, float], ...]  # hinge parameters of each leg's knee; empty without dampers
 
     @property
     def shared(self) -> dict[str, Any]:
-        """Parameters of both legs together."""
+        """Parameters that the two legs have in common."""
         return {"hip": self.hip, "push_off": max(self.push_offs)}
 
 

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 
 def foothold_heights(ground: contact.Footholds, steps: int) -> system.Floats | None:
-    """Return the heights (steps + 1,) of the footholds in m above the slope, from the start on, or None if even."""
+    """Return the heights (steps + 1,) in m of the footholds above the slope, from the start on, or None on even
+    ground."""
     if ground.even:
         return None
     if ground.heights_m:
@@ -31,7 +32,7 @@ def foothold_heights(ground: contact.Footholds, steps: int) -> system.Floats | N
 
 
 FIRST_STEP = registry.Tolerances("dop853", 1e-10, 1e-12, registry.ENDLESS)
-CACHED_LEVEL_WALKERS = 16  # walkers on level ground that are kept, for families over slopes
+CACHED_LEVEL_WALKERS = 16  # number of walkers that are cached, since all members of a family over slopes share one
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class RigidScene:
     walker: RigidModel
     names: tuple[str, ...]  # names of the state variables
     knees_m: tuple[Position, ...]  # position of each leg's knee in its thigh's frame; empty without knees
-    outputs: "tuple[Output, ...]"  # outputs to record over time
+    outputs: "tuple[Output, ...]"  # groups of quantities to record over time
     ground: contact.Footholds
 
     def walk(
@@ -82,7 +83,7 @@ def add_drives(passive: RigidModel, config: reads.RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": drives.knees[leg]} if drives.knees else {})
         for leg, push in enumerate(drives.push_offs)
     ]
-    # With equal drives, both legs share one model.
+    # Legs with equal drives share one model.
     if legs[0] == legs[1]:
         return driven.changed(**legs[0])
     return pair(*(replace_fields(model, leg) for model, leg in zip((driven, driven.exchanged), legs, strict=True)))
@@ -114,7 +115,7 @@ def state_names(config: reads.RigidConfig) -> tuple[str, ...]:
 def first_step_length(config: reads.RigidConfig, start: system.State) -> float:
     """Return the length (m) of the rigid model's first step from a state, or half a leg if it does not complete it.
 
-    This is the reference length of a walk that starts in mid-step, when the feet are not a step apart.
+    It is the reference length of a walk that starts in mid-step, because the feet are not a step apart then.
     """
     first = recorded_walk.take_walk(rigid_walker(config), FIRST_STEP, start, 1)
     return float(first.lengths_m[0]) if first.steps else 0.5 * config.walker.leg_length_m

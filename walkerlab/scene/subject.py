@@ -1,4 +1,5 @@
-"""Models with their gaits, ready to be disturbed or differentiated, and step maps over a parameter for families."""
+"""Prepare models and their gaits for disturbances and derivatives, and build step maps over a parameter for
+families."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 # Solver settings of one step of the contact model.
 CONTACT_STEP = registry.Tolerances("radau5", 1e-10, 1e-12, 60_000)
-RELATIVE_CHANGE = 1e-3  # relative change of a parameter, to test whether a model depends on it
+RELATIVE_CHANGE = 1e-3  # relative change of a parameter with which to test whether a model depends on it
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
@@ -35,12 +36,12 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
 
 
 def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
-    """Return the number of steps after which a family's step map repeats: 2 if the legs differ, or may differ."""
+    """Return the number of steps that a family's step map takes: 2 if the legs differ, or may differ, otherwise 1."""
     return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
 
 
 def scene_for(step_length_m: float) -> "Callable[[ContactConfig], ContactScene]":
-    """Return a function from configs to their contact scenes, with pads and terrain for steps of this length."""
+    """Return a function that builds the contact scene of a config, with pads and terrain for steps of this length."""
     from walkerlab.scene.contact import contact_scene
 
     return lambda config: contact_scene(config, step_length_m, step_length_m)
@@ -71,7 +72,8 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a parameter affects a model. This is assumed if the config allows no neighbouring value for a test."""
+    """Whether a parameter affects a model. This is assumed if no neighbouring value is valid, so that it cannot be
+    tested."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -94,7 +96,7 @@ def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError
     )
 
 
-# Solver settings, with a budget per step, for walks of which only the number of steps matters.
+# Solver settings, with a budget per step, for walks whose steps are only counted.
 QUICK_WALKS: Final = {
     family_search.RIGID: registry.Tolerances("dop853", 1e-7, 1e-9, registry.ENDLESS),
     family_search.CONTACT: registry.Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
@@ -120,8 +122,8 @@ class ModelUnderTest:
         return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
 
     def quick_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait on a map of quick walks, once for each leg that may begin to swing, or only once for equal
-        legs.
+        """Return the gait on a map of quick walks, for each leg that may swing first or, if the legs are equal, only
+        once.
         """
         quick = QUICK_WALKS[self.model]
         return [
@@ -132,7 +134,7 @@ class ModelUnderTest:
     @property
     def first_leg(self) -> int:
         """Leg (1 or 2) that swings in the first complete step from the gait's section."""
-        # The section of the contact model lies within the swing of leg 1, so the first complete step is that of leg 2.
+        # The contact model's section lies within the swing of leg 1, so in the first complete step leg 2 swings.
         return 1 if self.model == family_search.RIGID else 2
 
     @property
@@ -159,16 +161,16 @@ def find_model_gait(
     gait  summary of `fixedpoint`
     note  called with a message about each difference from the scene of the config
 
-    Raises NoAnswer if it has no gait.
+    Raises NoAnswer if the model has no gait.
     """
     length = float(gait["step_length_m"])
     if model == family_search.RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])
         return ModelUnderTest(family_search.RIGID, config, z, length)
-    # Imported late, because the rigid model does not need it.
+    # Imported here, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
-    # `config` may have only the keys that a stage reads, but the search needs a complete config to copy.
+    # `config` may have only the keys that a stage reads, but the search changes copies of a complete config.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

@@ -1,4 +1,4 @@
-"""Describe how walks ended, and whether the cause is the ground, such as its pads, rather than the walker."""
+"""Describe how walks ended, and whether the ground, for example its pads, is the cause rather than the walker."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import Kneed
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 
-# Explanations of outcomes that the ground of the contact model causes, except for pads.
+# Explanations of the outcomes that the contact model's ground causes, other than those on pads.
 GROUND_CAUSES: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",
@@ -25,7 +25,7 @@ class Pads:
 
     pitch_m: Range  # minimum and maximum over the walks, m
     step_m: Range | None = None  # minimum and maximum length of the last steps of the walks, m; None if unknown
-    laid: str = ""  # `contact.pad_pitch` in the config, if it is the same for all walks
+    laid: str = ""  # value of `contact.pad_pitch`, if it is the same for all walks
 
 
 def describe_endings(
@@ -35,7 +35,7 @@ def describe_endings(
 
     outcomes  number of walks by outcome; other keys are ignored
     contact   whether they are walks of the contact model
-    pads      pads of the walks that ended off-pad
+    pads      pads on which the walks with the outcome off-pad ended
 
     Returns rows with `outcome`, `walks`, `of` (total number of walks), `ground` (whether the ground is the cause) and
     `said` (description).

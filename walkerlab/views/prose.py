@@ -1,4 +1,4 @@
-"""Texts kept as Jinja templates, with a file per subject and a macro per paragraph."""
+"""Render texts from Jinja templates, which have a file for each subject and a macro for each paragraph."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -11,18 +11,18 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 BLANKS = re.compile(r"[ \n]+")
-"""Blanks and line ends of a template, but not the narrow and no-break spaces within numbers."""
+"""Pattern of blanks and line ends in a template. It leaves out the narrow and no-break spaces in numbers."""
 BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
 """Separator of the parts of a text, as in 'one | two'."""
 
 
 def parts(text: str) -> list[str]:
-    """Split a text at its | marks, dropping empty parts."""
+    """Split a text at each |, and drop empty parts."""
     return [stripped for part in BETWEEN_PARTS.split(text) if (stripped := part.strip(" \n"))]
 
 
 def f(value: float, spec: str) -> str:
-    """Format a number with a format specification, such as .4f."""
+    """Format a number by a format specification, such as .4f."""
     return format(value, spec)
 
 
@@ -32,7 +32,7 @@ def percent(share: float, digits: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Prose:
-    """Renders paragraphs from a folder of templates as plain text."""
+    """Renders paragraphs, as plain text, from a folder of templates."""
 
     folder: Path
     filters: Sequence[Callable[..., Any]]  # functions that templates may use as filters
@@ -40,7 +40,7 @@ class Prose:
 
     @cached_property
     def templates(self) -> "Environment":
-        # Imported here: commands that print no prose need no Jinja.
+        # Imported here, because commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
         # Texts are not escaped here: terminals show them as they are, and pages escape them later.
@@ -60,9 +60,9 @@ class Prose:
         return BLANKS.sub(" ", rendered).strip()
 
     def parts(self, name: str, *values: Any) -> list[str]:
-        """Render a text, and split it at its | marks, dropping empty parts. The arguments are those of a call."""
+        """Render a text, split it at each |, and drop empty parts. The arguments are those of `__call__`."""
         return parts(self(name, *values))
 
     def terms(self, name: str, *values: Any) -> dict[str, str]:
-        """Return the meaning of each word in a macro whose parts have the form 'word: meaning'."""
+        """Render a text whose parts have the form 'word: meaning', and return the meaning of each word."""
         return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

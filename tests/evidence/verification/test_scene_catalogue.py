@@ -141,7 +141,7 @@ def numbers_of(block):
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 
 
-def test_every_scene_uses_the_same_known_problems():
+def test_every_scene_uses_the_same_problems_with_known_answers():
     stage = PIPELINE["known-problems"]
     slices = [Keys().identity(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
     assert slices == [{}, {}]

@@ -1,1 +1,1 @@
-"""First layer of the pipeline: find the requested config and folder, the stages needed, and the results to reuse."""
+"""First layer of the pipeline: find the config and folder of a request, the stages it needs, and results to reuse."""

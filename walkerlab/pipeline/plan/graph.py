@@ -1,4 +1,5 @@
-"""Graphs of stages, and the pipeline: the stages of all extensions, drawings last and the report at the end."""
+"""Graphs of stages, and the pipeline, which has the stages of all extensions: drawings come late, and the report
+last."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +22,7 @@ class Graph:
     def __init__(self, *stages: Stage, at: str = "") -> None:
         """Store the stages.
 
-        Raises ValueError if two have the same name.
+        Raises ValueError if two stages have the same name.
         """
         self.stages = stages
         self.at = at
@@ -30,7 +31,7 @@ class Graph:
             raise ValueError("two stages have the same name")
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
-        """Pickle the import path alone: stages hold functions that cannot be pickled."""
+        """Pickle only the import path, because stages hold functions that cannot be pickled."""
         if not self.at:
             raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
         return load, (self.at,)
@@ -53,7 +54,7 @@ class Graph:
     def needed_in_memory(self, target: str, config: "Config") -> tuple[Stage, ...]:
         """Return the stages as `needed_for` does.
 
-        Raises ConfigError if one lacks a config block or draws files.
+        Raises ConfigError if one of them lacks a config block or draws files.
         """
         stages = self.needed_for(target, config)
         for stage in stages:
@@ -63,7 +64,7 @@ class Graph:
         return stages
 
     def campaigns_of(self, target: str) -> tuple[Stage, ...]:
-        """Return the stages that `target --full` runs in addition."""
+        """Return the long stages that only `target --full` runs."""
         return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
 
 

@@ -19,7 +19,7 @@ from walkerlab.scene.omissions import LeftOut
 
 
 class Planner:
-    """Decides for each of some stages, under one config, whether to reuse, run or leave it out.
+    """Decides for each of its stages, under one config, whether to reuse its result, run it or leave it out.
 
     stages    stages to bring up to date, each after the stages that it needs
     force     whether to run every stage that is not left out, even if the result is current
@@ -43,7 +43,8 @@ class Planner:
         self._keys: dict[str, str] = {}
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide for each stage whether to run or reuse it, assuming that every run succeeds. No file changes."""
+        """Decide for each stage whether to run it or reuse its result, assuming that every run succeeds. No file
+        changes."""
         steps = []
         for stage in self.stages:
             step = self.decide(stage)
@@ -55,12 +56,12 @@ class Planner:
     def decide(self, stage: Stage) -> Step:
         """Decide whether to reuse, run or leave out a stage. Its inputs must have been decided before.
 
-        Optional inputs outside this plan are looked up first. If one is damaged, it is recorded as left out.
+        First, optional inputs that are not in this plan are looked up. A damaged one is recorded as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
                 step = self._judge(self.graph[name], force=False)
-                # Optional results in other folders are not copied, so they do not count.
+                # A result in another folder does not count, because optional results are not copied.
                 if step.action == "reuse" and step.origin is None:
                     self.expect(step)
                 elif step.damaged:
@@ -90,13 +91,13 @@ class Planner:
         return {name: self.answers[name] for name in stage.results(self.config) if name in available}
 
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
-        """Return the results that a stage lacks, with the reasons."""
+        """Return the inputs that a stage lacks, with the reasons."""
         missing = (name for name in stage.results(self.config) if name not in self._keys)
         return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _judge(self, stage: Stage, force: bool) -> Step:
         reason = stage.why_unsuited(self.config)
-        # A drawing shows the results that exist, and says which are missing.
+        # A drawing lacks nothing: it shows the results that exist, and says which are missing.
         for name in () if stage.draws else stage.inputs(self.config):
             if reason is None and name in self.left_out:
                 reason = f"it needs {name}: {self.left_out[name]}"
@@ -122,12 +123,12 @@ class Planner:
 
 
 def omission_of(stage: str, why: str) -> LeftOut:
-    """Describe a stage that is left out, with the reason and the savings."""
+    """Describe a stage that is left out, with the reason and what this saves."""
     return LeftOut(stage, why, "loading and compiling contact code" if why == message_without_block("contact") else "")
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
-    """Return the step that would bring each stage of a run folder up to date. This changes no file."""
+    """Return, for each stage of a run folder, the step that would bring it up to date. This changes no file."""
     return Planner(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
 
 
@@ -146,7 +147,7 @@ class RunSummary:
 
 
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
-    """Iterate over the runs in a folder in order of their names, skipping folders without results."""
+    """Yield the runs in a folder, sorted by name. Folders without results are skipped."""
     for path in sorted(runs_dir.glob("*/")):
         folder = RunFolder.open_folder(path)
         stages = tuple(name for name in graph.names if folder.artifact(name).is_file())
@@ -165,9 +166,9 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
 
 
 def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE) -> dict[str, Stored]:
-    """Return the existing results of these stages.
+    """Return the results of these stages that exist.
 
-    Raises StaleError naming all that are unreadable.
+    Raises StaleError, which lists all unreadable results.
     """
     intact, bad = read_all(folder, stages)
     if bad:
@@ -188,7 +189,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
     """Return the result of a stage from the `results` of its run.
 
-    Raises StaleError if it is missing.
+    Raises StaleError if the result is missing.
     """
     if stage not in results:
         raise StaleError(f"{folder.path} has no result of {stage}.", f"{command(folder, graph[stage])} computes it.")
@@ -222,7 +223,8 @@ def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPE
 
 @contextlib.contextmanager
 def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = PIPELINE) -> Iterator[None]:
-    """Convert a KeyError in a `with` block to StaleError if results are outdated: they may lack the key."""
+    """Convert a KeyError in a `with` block to StaleError if some results are outdated, because they may lack the
+    key."""
     try:
         yield
     except KeyError as missing:

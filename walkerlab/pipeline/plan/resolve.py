@@ -59,8 +59,8 @@ def resolve(
     for stage in PIPELINE.stages:
         stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
-    # A name that the user chose does not show the changes, so the source must. Otherwise other results in that folder
-    # would seem to be of the same config.
+    # A name that the user chose does not show the changes, so the source must. Otherwise, results of another config
+    # in that folder would seem to belong to this one.
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
     return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), files.config_to_extend(text))
@@ -69,7 +69,7 @@ def resolve(
 def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str]]:
     """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
 
-    Keys that the run sets itself are not compared.
+    Keys that were set when the run was made are not compared.
     """
     source = folder.source.partition(" with ")[0]
     is_builtin = source.startswith(BUILTIN)
@@ -84,7 +84,7 @@ def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str
     except ConfigError:
         return file.label, ["it is no longer valid"]
     changed_keys = {loader.key_of(change) for change in folder.changes}
-    # A setting in degrees changes slope_rad, and any setting may change angles of the start.
+    # A setting of slope_deg changes slope_rad, and any setting may change angles of the start.
     changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
     before, after = (dict(reads.flatten(dump)) for dump in dumps)
@@ -96,7 +96,8 @@ def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str
 
 
 def warn_of_edits(config: schema.Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
-    """Warn if the config file of a run was edited after the run. `config` is that of the run, or None if unreadable."""
+    """Warn if the config file of a run was edited after the run. `config` is the run's, or None if that is
+    unreadable."""
     if config is None:
         return
     file, edits = edits_since(config, folder)
@@ -113,7 +114,7 @@ def refuse_invalid_parts(read: loader.LoadedConfig) -> None:
     config = read.config
     if not isinstance(config.walker, walkers.AssembledWalker):
         return
-    # Imported here: mechanics take long to import, and walkers of other types are valid by construction.
+    # Imported here, because mechanics take long to import, and only walkers of parts can be invalid.
     from walkerlab.scene.rigid import level_walker
 
     try:
@@ -138,7 +139,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, files.ConfigFile] | None:
-    """Return the run whose name or folder is `text`, with the config of the run, or None if there is no such run."""
+    """Return the run whose name or folder is `text`, and its config, or None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
         return None

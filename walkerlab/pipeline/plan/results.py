@@ -1,4 +1,4 @@
-"""Stores of results, in a run's folder or in memory, and the identities by which results are up to date or not."""
+"""Find and keep results in a run's folder or in memory, and compute the identities that show which are up to date."""
 
 import json
 import mmap
@@ -23,7 +23,7 @@ from walkerlab.pipeline.store.provenance import Provenance
 
 
 class Keys:
-    """Builds identities of results. Parts that do not depend on the config are computed once per stage."""
+    """Computes the identities of results. Whatever does not depend on the config is computed once per stage."""
 
     def __init__(self, graph: Graph = PIPELINE) -> None:
         """Create an empty cache of digests, which are computed on first use."""
@@ -46,7 +46,7 @@ class Keys:
         """Return the identity of a stage's result under a config.
 
         input_keys  keys of the inputs, by stage
-        again       as for `call_stage`; true for every stored result
+        again       as for `call_stage`; always true for results in folders
         """
         once = {} if again else {"again": False}
         dependencies = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
@@ -55,7 +55,8 @@ class Keys:
         )
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
-        """Return the digest of a stage's code, and of code of extensions that it uses, computed at the first call."""
+        """Return the digest of a stage's code and of the code of extensions that it uses. It is computed at the first
+        call."""
         used = (target, *sorted(added))
         if used not in self._digests:
             modules = {code.partition(":")[0] for code in added}
@@ -67,11 +68,11 @@ class Keys:
 def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     """Return the code of extensions, as "module:name", that a stage's result depends on.
 
-    This is the code of the laws that its part of the config names, or its other dependencies, `own`. For drawings it is
-    the code of everything drawn.
+    This is the code of the laws that the stage's part of the config, or `own`, its other dependencies, name.
+    For drawings, it is the code of everything drawn.
     """
     text = json.dumps(own)
-    # If the word is the value of another key, the identity contains more code than necessary, which does no harm.
+    # If a word happens to be the value of another key, the identity contains unnecessary code, which does no harm.
     used = {code for key in WORDS for word, code in code_by_word(key).items() if json.dumps(word) in text}
     if stage.draws:
         used |= {code for extension in extensions().values() for code in extension.drawing_code()}
@@ -82,18 +83,19 @@ Action = Literal["reuse", "run", "leave out"]
 
 UP_TO_DATE = "up to date"
 REMEMBERED = 256
-"""Number of results kept in memory. They pay off because neighbouring points of a sweep often share inputs."""
+"""Number of results kept in memory. Keeping some saves time, because neighbouring points of a sweep often share
+inputs."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Action for one stage, planned or taken."""
+    """Planned or completed action for one stage."""
 
     stage: Stage
     action: Action
     reason: str  # reason for the action
     identity: Identity | None = None  # identity of the stage's result; None if the stage is left out
-    found: Content | None = None  # the intact stored result: the one to reuse, or an outdated one
+    found: Content | None = None  # the stored result if it is intact: to be reused, or outdated
     damaged: Path | None = None  # file of the stored result, if it is damaged
     origin: Path | None = None  # file of the result to reuse, if it is in another run's folder
     wall_s: float = 0.0  # run time; 0 if the stage has not run
@@ -125,7 +127,7 @@ class FolderResults:
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
             return Step(stage, "reuse", reason, identity, stored)
-        # Drawings are never shared, because they consist of files next to the artifact.
+        # A drawing is never taken from another folder, because it consists of more files than the artifact.
         looks = self.elsewhere and not force and not stage.draws
         match = find_elsewhere(self.run, stage.name, identity.key) if looks else None
         if match is not None and not recomputed_input(stage, match[1], inputs):
@@ -134,7 +136,7 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """Link or copy the file of the result if the step reuses it from the folder of another run.
+        """Link or copy the file of a result into this folder if the step reuses it from another run.
 
         Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
         """
@@ -173,7 +175,7 @@ class FolderResults:
         return stored
 
     def _why_outdated(self, stage: Stage, identity: Identity, verdict: Lookup, inputs: Mapping[str, Content]) -> str:
-        """Return the reason why a stage has to run, or '' if its result is current."""
+        """Return why a stage has to run, or '' if its result is current."""
         stored = verdict.artifact
         if not verdict.accepted or stored is None:
             changes = changed_parts(stored.identity, identity) if stored is not None else []
@@ -198,7 +200,8 @@ def input_digest(stage: Stage, result: Content) -> str:
 
 
 def find_elsewhere(folder: runs.RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find file and result for a key in another run folder, or return None. Damaged files are ignored."""
+    """Find a result with this key in another run folder, and return its file and itself, or None. Damaged files are
+    ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -228,7 +231,7 @@ class LoadedCodeKeys(Keys):
 
 
 class MemoryResults:
-    """Results in memory: the latest ones that other stages need."""
+    """Results in memory. Only the latest ones that other stages need are kept."""
 
     folder = None
 

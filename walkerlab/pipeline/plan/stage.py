@@ -1,7 +1,7 @@
 """Stages of a pipeline, and the options of their commands.
 
-Extensions declare their stages with this file, and the help of the command line is built from them. So it imports no
-stage, no config schema and no NumPy.
+Extensions declare their stages with this module, and the command line builds its help from these. To keep the
+help fast, it imports no stage, no config schema and no NumPy.
 """
 
 import importlib
@@ -24,7 +24,7 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
 ]
-"""Ways to read the value of an option. They are listed in docs/adding.md."""
+"""Ways to read the value of an option, which docs/adding.md lists."""
 
 
 def message_without_block(name: str) -> str:
@@ -43,7 +43,7 @@ def no_dependencies(_config: object) -> Mapping[str, Any]:
 
 
 def dependency(name: str, code: str) -> "Callable[[Config], Mapping[str, Any]]":
-    """Return a function of the config whose result is {name: value}. `code`, "module:name", computes the value."""
+    """Return a function of the config that returns {name: value}, where `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
 
 
@@ -65,7 +65,8 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 
 def walks_and(*names: str) -> Inputs:
-    """Return a function of the config that returns the walking stages, `recorded-walk` if recorded, and `names`."""
+    """Return a function that returns the stages in `names`, the walking ones and, if a config has one, the recorded
+    walk."""
     return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
@@ -79,14 +80,15 @@ class Option:
     help: str
     kind: OptionKind = "word"
     needs: tuple[str, ...] = ()  # flags that must be given with it
-    runs: str = ""  # stage that the command runs instead if the option is given; such an option sets no key
+    runs: str = ""  # stage to run instead if the option is given, which then sets no key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return options for facts that a recording does not state. They set keys of `block` and need the flags `needs`."""
+    """Return options for what a recording does not say about itself. They set keys of `block` and need the flags
+    `needs`."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units of columns, where the file does not state them.", "units"),
@@ -112,22 +114,22 @@ class Stage:
     name: str  # name of the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # Type of the slice of the config that `run` takes and the result depends on, or a function from a config to this
-    # type. None means the whole config.
+    # Type of the slice of the config that `run` takes and on which the result depends, or a function that returns this
+    # type for a config. None means the whole config.
     takes: "type | Callable[[Config], type] | None"
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
     needs_equal_legs: bool = False
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
     options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
-    # "times": measures run times, so it must run alone. "draws": also writes files, from the results that exist.
+    # "times": it measures run times, so it must run alone. "draws": it also writes files, from the results that exist.
     work: Literal["computes", "times", "draws"] = "computes"
-    # The only command that runs the stage (that of its name or `STAGE --full`). Empty if all commands that need it do.
+    # The only command that runs the stage, if others that need it do not: the stage's own or `STAGE --full`.
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
-    early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
+    early_with: tuple[str, ...] = ()  # stages whose results suffice for a partial drawing while others still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
-    # returns what else the result depends on, by name, such as digests of files and versions of other programs
+    # returns, by name, whatever the result depends on besides, such as files (digests) and other programs (versions)
     depends_on: "Callable[[Config], Mapping[str, Any]]" = no_dependencies
     checks: "Callable[[Config], object]" = nothing  # raises ConfigError for a config with which no command should run
     # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
@@ -136,11 +138,11 @@ class Stage:
     shown_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that show this one's result if it is current
 
     def takes_under(self, config: "Config") -> type | None:
-        """Return the type of the config slice that the stage's result depends on, or None for the whole config."""
+        """Return the type of the config slice on which the stage's result depends, or None for the whole config."""
         return self.takes if self.takes is None or isinstance(self.takes, type) else self.takes(config)
 
     def reads(self, config: "Config") -> tuple[str, ...]:
-        """Return the dotted config keys that the stage's result depends on."""
+        """Return the dotted config keys on which the stage's result depends."""
         takes = self.takes_under(config)
         return tuple(type(config).model_fields if takes is None else reads.dotted_keys(takes))
 
@@ -154,7 +156,7 @@ class Stage:
         return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: "Config") -> str | None:
-        """Return the reason why the stage has no result for the legs of a config, or None if it has one."""
+        """Return the reason why the stage has no result for a config's unequal legs, or None if it has one."""
         if not self.needs_equal_legs:
             return None
         # Imported here to keep the help of the command line fast. Equal legs need no mechanics.

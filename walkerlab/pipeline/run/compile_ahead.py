@@ -1,4 +1,4 @@
-"""Compilation of kernels ahead of their use: in the package's build, and by `walkerlab compile`."""
+"""Compile kernels before they are used: while the package is built, and by `walkerlab compile`."""
 
 import json
 import os
@@ -19,12 +19,12 @@ from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 COMPILING_BUDGET = 200  # right-hand sides, enough for the first step of each method
-# One method for each form of the kernels: our two, and one of another library, which calls kernels from Python.
+# One method for each form of the kernels: our two methods, and one of another library, which calls them from Python.
 COMPILED_METHODS = ("radau5", "dop853", "scipy-radau")
 
 
 def compile_rigid(method: str, config: Config) -> None:
-    """Compile the kernels of the rigid model by a step from rest."""
+    """Compile the kernels of the rigid model by simulating a step from rest."""
     from walkerlab.physics.hybrid.recorded_walk import take_walk
     from walkerlab.physics.hybrid.rigid_measures import energies, reactions
     from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, strike_section
@@ -43,7 +43,7 @@ def compile_rigid(method: str, config: Config) -> None:
 
 
 def compile_contact(method: str, config: Config) -> None:
-    """Compile the kernels of the contact model by the beginning of a walk, if the config has contact."""
+    """Compile the kernels of the contact model, if the config has one, by simulating the beginning of a walk."""
     from walkerlab.physics.hybrid.contact_result import sample_energies, sample_feet
     from walkerlab.physics.mechanics.rigid import group_bodies
     from walkerlab.physics.solvers.registry import Tolerances
@@ -97,7 +97,7 @@ PARTS: tuple[Callable[[Config], None], ...] = (
     compile_plain_systems,
     compile_lanes,
 )
-"""Functions that compile parts of the kernels of a config, the slowest first."""
+"""Functions that compile some kernels of a config each, the slowest first."""
 
 
 def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
@@ -109,7 +109,8 @@ def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
 
 
 def compile_ahead(configs: Iterable[Config], jobs: int) -> set[str]:
-    """Compile the kernels of some configs that package and cache lack. Return the names of the files of all kernels."""
+    """Compile the kernels of these configs, unless package or cache has them. Return the names of the files of all
+    kernels."""
     calls = [partial(compile_part, part, config) for config, part in product(configs, PARTS)]
     return set[str]().union(*map_in_order(calls, jobs))
 

@@ -28,7 +28,8 @@ Task = Callable[[StageReporter], Content]
 
 
 def task_of(stage: Stage, config: schema.Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
-    """Build the task of a stage under a config, for this or another process. The arguments are as in `call_stage`."""
+    """Build the task of a stage under a config, for this or another process. `inputs` and the rest are as in
+    `call_stage`."""
     return partial(call_stage, stage.module, reads.restrict(config, stage.takes_under(config)), inputs, offered)
 
 
@@ -45,9 +46,9 @@ def call_stage(
                again       whether to repeat walks to measure their numerical error, and to search for advice
                folder      run folder that the stage draws into
                left_out    results that are missing in a drawing, with the reasons
-               early       what this run has drawn early from some of the results; None if nothing
+               early       what this run has drawn from the first results; None if nothing
     """
-    # Imported only when the stage runs, because stages load libraries and compiled code.
+    # Imported only when the stage runs, because importing it loads libraries and compiled code.
     run = importlib.import_module(module).run
     arguments = {name: offered[name] for name in offered.keys() & signature(run).parameters.keys()}
     folder = arguments.get("folder")
@@ -123,7 +124,8 @@ class Executor:
             with WorkerPool(self.jobs) as pool:
                 while self._waiting or self._running:
                     self._start_ready_stages(pool if side_by_side else None)
-                    # The queue also holds messages of running stages. Only the end of a call lets another stage start.
+                    # The queue also holds messages of running stages, but another stage can start only after a call has
+                    # ended.
                     while self._working and not self._events.get()():
                         pass
                     self._early.draw(self._waiting, self._unsettled(), STILL_COMPUTED)
@@ -135,7 +137,7 @@ class Executor:
                 running_stage.reporter.end("")
 
     def skip(self, step: Step) -> None:
-        """Record a stage that does not run."""
+        """Record that a stage does not run."""
         self.done.append(replace(step, found=None))
         self.reporter.note(outcome_line(step))
 
@@ -221,7 +223,7 @@ class Executor:
 
 
 class EarlyDrawings:
-    """Draws the page from the first results while others are still being computed.
+    """Draws the page from the first results while the others are still being computed.
 
     drawn  results of early drawings, by stage
     """
@@ -232,7 +234,8 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Make the drawings for which the results so far suffice. `why` is why `unsettled` stages have no results.
+        """Make the drawings for which the results so far suffice. `why` is the reason why `unsettled` stages have no
+        results.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """
@@ -281,7 +284,8 @@ def any_side_by_side(stages: Sequence[Stage], config: schema.Config) -> bool:
 
 
 def short_reason(why: str) -> str:
-    """Cut a reason off where it begins to quote another stage, whose reason or error has a line of its own."""
+    """Cut off the part of a reason that quotes another stage, because that stage's reason or error has a line of its
+    own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 

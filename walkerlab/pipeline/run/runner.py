@@ -1,6 +1,6 @@
 """Bring a stage in a run's folder up to date under the folder's lock, and report the outcome.
 
-If the stage found parameters, `run_and_write` also writes them as a config that extends the one it ran under.
+If the stage found parameters, `run_and_write` also writes a config with them that extends the run's config.
 """
 
 import os
@@ -33,11 +33,11 @@ class StageReport:
     run_dir: Path  # the run's folder
     artifact: Path | None  # file of the result; None if there is no result
     reused: bool  # whether the result existed already
-    wall_s: float  # total time, inputs included
+    wall_s: float  # total time, including that of the inputs
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
     summary: dict[str, Any]  # summary of the result; empty if there is no result
     steps: tuple[Step, ...]  # action taken for each stage
-    # Error of the stage if it has no answer, otherwise of the first stage without one. None if all have answers.
+    # Error of the requested stage or, if that has an answer, of the first stage without one. None if all have answers.
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class Options:
     """Options for running a stage."""
 
     force: bool = False  # run the stage and all that it needs, even if their results are current
-    wait: bool = True  # wait for another process that works in the folder, then reuse what it has stored
+    wait: bool = True  # if another process works in the folder, wait for it and reuse what it has stored
     jobs: int = 1  # maximum number of processes, for independent stages and for independent work units of a stage
     full: bool = False  # also run the stage's long campaigns
     dry: bool = False  # only report the plan, without changing a file
@@ -144,7 +144,7 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     values = summary["best"] if "best" in summary else {row["key"]: row["value"] for row in summary["estimates"]}
     found = run.loaded.variant([files.parse_setting(f"{key}={value!r}") for key, value in values.items()])
     base = loader.paper_config_with({}) if run.extends == files.DEFAULT else run.loaded.base
-    # The new config describes the walker, not the question that found it.
+    # The new config describes the walker, so it leaves out the block with the question that found it.
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
     # A path in `extends` is relative to the file in which it stands.
     typed = run.extends if run.extends in files.builtin_names() else os.path.relpath(run.extends, report.run_dir)
@@ -192,7 +192,8 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target or, if it has an answer, of the first stage without one, or None if all have one.
+    """Return the error of the target or, if it has an answer, of the first stage without one. Return None if all have
+    one.
 
     message  message and advice of the target's error; None if it has an answer
     """

@@ -1,4 +1,5 @@
-"""Resumable work: batches of units spread over processes, each unit stored as soon as it is computed."""
+"""Spread units of work over processes, in batches, and store the result of each unit at once, so that work can
+resume."""
 
 import contextlib
 import math
@@ -16,7 +17,8 @@ from walkerlab.pipeline.run.workers import SizedExecutor, WorkerDiedError, Worke
 from walkerlab.pipeline.store.files import Checkpoint, Numbers
 
 SCOUTS: Final = 2
-"""Size of the first batch. It runs alone: it compiles the kernels for all, and shows how long a unit takes."""
+"""Size of the first batch. It runs alone, because it compiles the kernels for all others and shows how long a unit
+takes."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
@@ -24,16 +26,17 @@ SHARES: Final = 3
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
 """Errors that indicate a bug. They are not retried, because a retry would only repeat them."""
 MAX_DEATHS: Final = 12
-"""Maximum number of worker deaths before the first result. If there are more, the cause is the machine, not the work.
+"""Maximum number of worker deaths before the first result. More of them mean that the machine is the cause, not the
+work.
 """
 LAST_ATTEMPT: Final = 3
-"""Failures after which a unit gets its last attempt. Then it runs alone, because Dask counts the death of a worker
-against everything that this worker was given."""
+"""Number of failures after which a unit gets a last attempt. It then runs alone, because Dask blames the death of a
+worker on every unit that the worker was given."""
 NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, before it had computed one unit"
 
 
 class WorkUnit(NamedTuple):
-    """Piece of work that is computed as a whole. The result is stored under `name`."""
+    """Piece of work that is computed as a whole. Its result is stored under `name`."""
 
     name: str
     size: int  # number of parts that the unit adds to the progress
@@ -59,7 +62,7 @@ class InPlace(SizedExecutor):
 
 
 class JobEndsError(BaseException):
-    """Raised in a cluster's job by the signal that announces its end."""
+    """Raised in a cluster's job when a signal announces the job's end."""
 
 
 class JobEndedError(WalkerlabError):
@@ -80,16 +83,16 @@ def compute(units: Batch) -> list[Timed]:
 
 @dataclass
 class Spread:
-    """Distributes work units over an executor's workers and retries the units of a worker that died."""
+    """Distributes work units over an executor's workers, and retries the units of workers that die."""
 
     todo: Iterator[WorkUnit]  # units that are not handed out yet
     left: int  # number of units left in `todo`
     keep: Callable[[Batch, Sequence[Timed]], None]  # called with units and their results as they arrive
     give_up: Callable[[WorkUnit, BaseException], None]  # called with a unit that failed repeatedly, and its last error
-    batch_s: float  # target duration of a batch, s; 0: one unit at a time
-    unit_s: float | None = None  # run time of a unit, s; None until the first batch, which runs alone, has returned
+    batch_s: float  # target duration of a batch, s; 0 makes batches of one unit
+    unit_s: float | None = None  # run time of a unit, s; None until the first batch has returned
     _again: deque[tuple[Batch, int]] = field(default_factory=deque)
-    _suspects: deque[Batch] = field(default_factory=deque)  # units at their last attempt, which run alone, at the end
+    _suspects: deque[Batch] = field(default_factory=deque)  # units that later run alone, for the last time
     _running: dict[Future[Any], tuple[Batch, int]] = field(default_factory=dict)
     _deaths: int = 0
     _alive: bool = False
@@ -97,12 +100,13 @@ class Spread:
     def run(self, executor: SizedExecutor) -> None:
         """Compute all units.
 
-        Raises NoAnswer if workers keep dying before they compute anything, and bugs immediately.
+        Raises NoAnswer if workers keep dying before they compute anything. An error that indicates a bug is raised at
+        once.
         """
         while self.left or self._again or self._running or self._suspects:
             if not (self.left or self._again or self._running):
                 self._again.append((self._suspects.popleft(), LAST_ATTEMPT))
-            # One batch more than workers is handed out, so that no worker has to wait for its next one.
+            # There is always one batch more than there are workers, so that no worker has to wait for its next batch.
             max_running = 1 if self.unit_s is None else executor.size + 1
             while len(self._running) < max_running and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(executor.size), 0)
@@ -115,7 +119,8 @@ class Spread:
                 if results:
                     self._arrived(batch[: len(results)], results)
                     rest = batch[len(results) :]
-                    # The worker had to end before it came to these units, which does not count as a failure.
+                    # The worker had to end before it came to these units, so this does not count as a failure of
+                    # theirs.
                     self._again.extend([(rest, 0)] if rest else [])
                 else:
                     self._failed(batch, failures, error or JobEndedError(NOTHING_COMPUTED))
@@ -137,7 +142,7 @@ class Spread:
     def _arrived(self, batch: Batch, results: Sequence[Timed]) -> None:
         self._alive = True
         walls = [wall_s for _, wall_s in results]
-        # The first units also load compiled code, so the last one gives a better estimate.
+        # The first units also load compiled code, so the last unit of the first batch gives a better estimate.
         latest = max(1e-6, walls[-1] if self.unit_s is None else sum(walls) / len(walls))
         self.unit_s = latest if self.unit_s is None else 0.5 * (self.unit_s + latest)
         self.keep(batch, results)
@@ -175,14 +180,14 @@ def complete(
     shared_from: int = 0,
     compiled: bool = False,
 ) -> tuple[list[Numbers], int]:
-    """Compute the units that the checkpoint lacks, and store each in it.
+    """Compute the units that the checkpoint lacks, and store the result of each in it.
 
     checkpoint   units that an earlier run computed
     jobs         maximum number of processes
     shared_from  minimum total size for which starting processes saves time
     compiled     whether all kernels are compiled; if not, the first unit runs alone and compiles them once
 
-    Returns the values computed for each unit, and the total size of the units computed now.
+    Returns the result of every unit, and the total size of the units that this call computed.
     """
     waiting = [unit for unit in units if unit.name not in checkpoint.kept]
     size = sum(unit.size for unit in waiting)

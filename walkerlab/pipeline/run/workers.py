@@ -4,7 +4,8 @@ A worker is a separate interpreter that receives calls and returns their results
 scripts without a guard, code from standard input and notebooks can use workers. Workers end when their parent ends,
 for whatever reason. The parent handles keyboard interrupts.
 
-Signals that stop a command raise an error in the main thread, but not inside LLVM callbacks, which lose it.
+Signals that stop a command raise an error in the main thread, but never inside an LLVM callback, where it would be
+lost.
 """
 
 import _thread
@@ -37,7 +38,7 @@ CALLED_BACK = "_raw_object_cache"
 """Prefix of the names of functions that LLVM calls after compiling or loading. Errors raised in them are lost."""
 
 STORING_PATIENCE_S = 1.0
-"""Time that a command has to store finished results after its parent has ended."""
+"""Time that a command is given to store finished results after its parent has ended."""
 
 
 def raise_on(number: int, error: type[BaseException]) -> None:
@@ -177,7 +178,7 @@ class Worker:
         Raises WorkerDiedError and WorkerTimeoutError.
         """
         work = pickle.dumps(call)
-        with contextlib.suppress(OSError):  # if the worker is dead, its missing answer shows it below
+        with contextlib.suppress(OSError):  # if the worker is dead, its answer is missed below
             self._line.send_bytes(work)
         while isinstance(message := self._receive(timeout_s), CallMessage):
             if hear is not None:
@@ -219,13 +220,13 @@ class Worker:
 
 
 class SizedExecutor(Executor):
-    """Executor with a `size`: number of calls that run at the same time, or 0 if each runs in this process."""
+    """Executor with a `size`, the number of calls that run at the same time, or 0 if calls run in this process."""
 
     size: int
 
 
 class WorkerPool(SizedExecutor):
-    """Executor that starts workers as needed, replaces dead ones and ends all of them when it is shut down."""
+    """Executor that starts workers as needed, replaces those that died and ends all when it is shut down."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
         """Set up at most `size` workers without starting one. `modules` and `environment` are as in `Worker`."""
@@ -286,11 +287,12 @@ class WorkerPool(SizedExecutor):
 def map_in_order(
     calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = (), rank: Callable[[int], float] = float
 ) -> Iterator[R]:
-    """Iterate over the results of independent calls, in order.
+    """Yield the results of independent calls, in the order of the calls.
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index. Low ranks start first. Give them to long calls, so that no long call runs alone at the end
+    rank   function of an index. Calls of low rank start first, so give long calls a low rank: they then do not run
+    alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -307,7 +309,7 @@ def map_in_order(
 
 
 class LeaveError(BaseException):
-    """Error that a signal raises to end this process and drop its call."""
+    """Error with which a signal ends this process and drops its call."""
 
 
 def tell(value: Any) -> None:
@@ -322,7 +324,7 @@ _lines: list[Connection] = []
 
 def serve(number: int, modules: Sequence[str]) -> None:
     """Run calls until a signal ends this process. `number` is the file descriptor of the connection to the parent."""
-    # A program that a call starts would keep the connection open after this process has ended.
+    # Otherwise a program that a call starts would keep the connection open after this process has ended.
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)
@@ -349,7 +351,8 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 def answer(work: bytes) -> bytes:
-    """Run a pickled call and return its pickled answer. A description replaces an error that cannot be pickled."""
+    """Run a pickled call and return its pickled answer. An error that cannot be pickled is replaced by a
+    description."""
     try:
         return pickle.dumps(Answer(pickle.loads(work)()))
     except Exception as error:

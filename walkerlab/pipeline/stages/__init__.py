@@ -1,1 +1,1 @@
-"""Stages of the core, one module each, with the groups and summaries that they store."""
+"""Stages of the core, one module each, and the groups and summaries that they store."""

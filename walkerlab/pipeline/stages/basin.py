@@ -31,7 +31,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqr
 REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
-FAILED = grid.UNREACHED - 1  # code of a cell whose walk fails
+FAILED = grid.UNREACHED - 1  # marks a cell whose walk fails, among numbers of attractors
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -63,10 +63,10 @@ def run(
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
-    # Work units return floats, because a checkpoint can store only these.
+    # Work units return floats, because a checkpoint can store only floats.
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
-    # The edge of the basin also separates walks that fail from walks that go on without reaching an attractor.
+    # The edge of the basin includes that between walks that fail and walks that go on without reaching an attractor.
     edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
@@ -89,7 +89,7 @@ def run(
 
 
 def sample_again(question: "Question", window: grid.Window, ends: grid.WalkEnds) -> dict[str, int]:
-    """Repeat the walks from evenly spaced cells at tighter tolerances, and count those that end differently."""
+    """Repeat the walks from some evenly spaced cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     tighter = question.tightened().walk_to_ends(window.starts(cells))
     otherwise = (tighter.outcome != ends.outcome[cells]) | (tighter.attractor != ends.attractor[cells])
@@ -204,7 +204,8 @@ def gaussian(window: grid.Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing without one."""
+    """Return the distance (rad, sqrt(g/L)) from the gait, if it is stable, to the nearest failing cell, or {} without
+    one."""
     # The error of the distance is the size of a cell.
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
@@ -216,7 +217,7 @@ def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gai
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
-    """Rigid model, with the rules that classify the ends of its walks."""
+    """Rigid model, and how the ends of its walks are classified."""
 
     rigid: RigidModel
     walker: grid.Walker  # the unit walker
@@ -255,7 +256,7 @@ class RigidQuestion:
 
 @dataclass(frozen=True, eq=False)
 class ContactQuestion:
-    """Contact model, with the rules that classify the ends of its walks. At the start of a walk the stance foot just
+    """Contact model, and how the ends of its walks are classified. At the start of a walk, the stance foot just
     touches the ground and rolls without slip.
     """
 
@@ -266,7 +267,7 @@ class ContactQuestion:
     cells_at_once: int = 100
     edges_at_once: int = 10
     shared_from: int = 500
-    aperiodic: ClassVar[bool] = False  # only its gait is considered as an attractor
+    aperiodic: ClassVar[bool] = False  # the only attractor that is considered is the gait
 
     def attractor_rows(self) -> list[dict[str, Any]]:
         """Describe the attractor by the period and length of its step, or return nothing if the model has no gait."""
@@ -299,7 +300,8 @@ Question = RigidQuestion | ContactQuestion
 def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
 ) -> list[WorkUnit]:
-    """Divide cells into work units of `at_once` cells, each named by its first cell. Each cell needs `walks` walks."""
+    """Divide cells, which need `walks` walks each, into work units of `at_once` cells. A unit is named by its first
+    cell."""
     groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 

@@ -1,4 +1,4 @@
-"""Walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
+"""Simulate a walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -14,19 +14,7 @@ from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by
 from walkerlab.physics.mechanics.parts import hinge_point
 from walkerlab.physics.solvers import registry, system
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import (
-    STRIDE,
-    asymmetry_of,
-    content_of_walk,
-    leg_labels,
-    measure_pace,
-    rigid_start,
-    rotation_variables,
-    step_asymmetry,
-    steps_of,
-    summarise_walk,
-    variables_over_time,
-)
+from walkerlab.pipeline.stages import walk
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
 from walkerlab.scene import contact, omissions, rigid
 from walkerlab.scene.parts import TORSO
@@ -45,8 +33,8 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
     Raises NoAnswer if the solver fails.
     """
-    rigid_step, rigid_state = rigid_start(config, inputs)
-    scene = contact.scene_on_pads(config, rigid_step, rigid_state, asymmetry=step_asymmetry(config, inputs))
+    rigid_step, rigid_state = walk.rigid_start(config, inputs)
+    scene = contact.scene_on_pads(config, rigid_step, rigid_state, asymmetry=walk.step_asymmetry(config, inputs))
     start = contact.start_state(scene, rigid_state)
     steps = 2 * config.strides
     tolerances = contact.tolerances_of(config, steps)
@@ -54,7 +42,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     heights = rigid.foothold_heights(config.ground, steps + 1)
     warn_of_unresolved_slip(tolerances.atol, scene, progress)
 
-    def walk(tolerances: registry.Tolerances, sampled: bool) -> ContactWalkResult:
+    def simulate(tolerances: registry.Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
         result = scene.walk(start, steps, tolerances, interval if sampled else None, heights)
         progress.advance()
@@ -62,7 +50,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
     stored = partial(groups, config, scene)
     summarise = partial(summary, config, scene)
-    return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
+    return walk.content_of_walk("contact-sim", simulate, tolerances, stored, summarise, progress, again)
 
 
 def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: Progress) -> None:
@@ -75,37 +63,38 @@ def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: 
         )
 
 
-def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
-    """Return the asymmetry of the last stride, including that of stance times, touch to lift (leg 2 minus leg 1)."""
-    # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
-    count = walk.steps - walk.steps % STRIDE
-    if not count or walk.stance_s.size < count:
+def add_stance_time(numbers: Mapping[str, Any], result: ContactWalkResult) -> dict[str, Any]:
+    """Return the asymmetry of the last stride (leg 2 minus leg 1), including that of the times from touch to lift."""
+    # Leg 2 is the stance leg in the first step of a stride. The last stance foot may not have lifted yet.
+    count = result.steps - result.steps % walk.STRIDE
+    if not count or result.stance_s.size < count:
         return {}
-    second, first = walk.stance_s[count - STRIDE : count].tolist()
-    return {"asymmetry": {**numbers["asymmetry"], "stance_time": asymmetry_of(first, second)}}
+    second, first = result.stance_s[count - walk.STRIDE : count].tolist()
+    return {"asymmetry": {**numbers["asymmetry"], "stance_time": walk.asymmetry_of(first, second)}}
 
 
-def summary(config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
-    scuffed = contact.require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
-    strikes = walk.knee_strike_time_s
-    numbers = summarise_walk(walk)
+def summary(config: ContactSimConfig, scene: contact.ContactScene, result: ContactWalkResult) -> dict[str, Any]:
+    scuffed = contact.require_contact(config).terrain == "plane" and result.outcome.stumbled and not scene.walker.kneed
+    strikes = result.knee_strike_time_s
+    numbers = walk.summarise_walk(result)
     return {
         **numbers,
-        **add_stance_time(numbers, walk),
-        **measure_pace(config, walk),
-        "advice": SCUFFED if scuffed else walk.advice,
-        "max_penetration_m": walk.max_penetration_m,
-        "slip_per_step_m": mean_of(walk.slip_m),
-        "slips_m": walk.slip_m.tolist(),
-        "rolling_per_step_m": mean_of(walk.rolling_m),
-        "rolling_m": walk.rolling_m.tolist(),
-        "energy_balance_residual_J": walk.energy_balance_residual_J,
-        "dissipated_J": losses_by_channel(scene.walker, walk.dissipated_J),
-        # This old key of the knee strike times is kept until version 0.3. It has -1 where a knee did not lock.
+        **add_stance_time(numbers, result),
+        **walk.measure_pace(config, result),
+        "advice": SCUFFED if scuffed else result.advice,
+        "max_penetration_m": result.max_penetration_m,
+        "slip_per_step_m": mean_of(result.slip_m),
+        "slips_m": result.slip_m.tolist(),
+        "rolling_per_step_m": mean_of(result.rolling_m),
+        "rolling_m": result.rolling_m.tolist(),
+        "energy_balance_residual_J": result.energy_balance_residual_J,
+        "dissipated_J": losses_by_channel(scene.walker, result.dissipated_J),
+        # Until version 0.3, the knee strike times are also stored under their old key, with -1 for a knee that did not
+        # lock.
         **(
             {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
         ),
-        "jacobians": walk.work.jacobians,
+        "jacobians": result.work.jacobians,
         "slope_rad": scene.walker.slope,
         **contact.scene_measures(scene),
         "left_out": list(omissions.contact_walk_omissions(config)),
@@ -117,14 +106,14 @@ def mean_of(values: system.Floats) -> float | None:
     return float(np.mean(values)) if values.size else None
 
 
-def groups(config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult) -> dict[str, Group]:
+def groups(config: ContactSimConfig, scene: contact.ContactScene, result: ContactWalkResult) -> dict[str, Group]:
     stored: dict[str, Group] = {}
-    if walk.steps:
-        stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
+    if result.steps:
+        stored["steps"] = Group(walk.steps_of(result, slip_m=result.slip_m, rolling_m=result.rolling_m))
     if scene.ground.terrain.has_pads:
-        stored["terrain"] = pads_group(scene.ground.terrain, walk.end_state[0])
-    if walk.samples is not None:
-        stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
+        stored["terrain"] = pads_group(scene.ground.terrain, result.end_state[0])
+    if result.samples is not None:
+        stored["trajectory"] = trajectory_group(config, scene, result, result.samples)
     return stored
 
 
@@ -144,21 +133,21 @@ def pads_group(terrain: Terrain, end: float) -> Group:
 
 
 def trajectory_group(
-    config: ContactSimConfig, scene: contact.ContactScene, walk: ContactWalkResult, samples: ContactSamples
+    config: ContactSimConfig, scene: contact.ContactScene, result: ContactWalkResult, samples: ContactSamples
 ) -> Group:
     """Build the group of the sampled quantities that the config's `outputs` select."""
-    variables = {**variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **leg_labels()}
+    variables = {**walk.variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **walk.leg_labels()}
     feet = sample_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
-        variables |= variables_over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
+        variables |= walk.variables_over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
     if "energies" in config.outputs:
-        footholds = np.append(feet[:1, STANCE_FOOT, 0], walk.touch_along_m)
-        step = np.searchsorted(walk.touch_time_s, samples.time_s, side="right")
-        variables |= energy_variables(scene, samples, footholds[step], walk.ground_m[step])
+        footholds = np.append(feet[:1, STANCE_FOOT, 0], result.touch_along_m)
+        step = np.searchsorted(result.touch_time_s, samples.time_s, side="right")
+        variables |= energy_variables(scene, samples, footholds[step], result.ground_m[step])
     if "forces" in config.outputs:
         depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
-        variables |= variables_over_time(
+        variables |= walk.variables_over_time(
             normal_force_N=feet[:, :, 2],
             friction_force_N=feet[:, :, 3],
             penetration_m=depth,
@@ -181,10 +170,10 @@ def state_variables(scene: contact.ContactScene, y: system.Floats) -> dict[str, 
     along = y[:, 0] + c @ layout.hip_x[:n] - s @ layout.hip_y[:n]
     height = y[:, 1] + s @ layout.hip_x[:n] + c @ layout.hip_y[:n]
     of_legs = {"angle": angle[:, upper], "velocity": velocity[:, upper]}
-    variables = variables_over_time(**of_legs, hip_along_m=along, hip_height_m=height)
+    variables = walk.variables_over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
         shanks, thighs = layout.knees.T.tolist()
-        variables |= rotation_variables("shank", angle[:, shanks], velocity[:, shanks])
+        variables |= walk.rotation_variables("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
@@ -193,9 +182,9 @@ def state_variables(scene: contact.ContactScene, y: system.Floats) -> dict[str, 
             up = knee[1] - hip[1]
             knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
-        variables |= variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
+        variables |= walk.variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
-        variables |= rotation_variables(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+        variables |= walk.rotation_variables(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
     return variables
 
 
@@ -211,7 +200,7 @@ def energy_variables(
     losses = samples.dissipated_J
     walker = scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
-    return variables_over_time(
+    return walk.variables_over_time(
         kinetic_J=kinetic,
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,

@@ -1,4 +1,4 @@
-"""Families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
+"""Follow families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,23 +27,24 @@ from walkerlab.scene.subject import contact_map, model_differs, rigid_map, steps
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
-"""Seeds of a search, and a function that returns the step map of a config over the parameter."""
+"""Seeds of a search, and a function that builds the step map of a config over the parameter."""
 MIN_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHT_EFFORT = newton.Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
+TIGHT_EFFORT = newton.Effort(1e-13)  # accuracy of Newton's method for measuring the numerical error
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
 @dataclass(frozen=True)
 class FamilyQuestion:
-    """Parameter of a config, and the span over which gaits are followed."""
+    """Parameter and span over which gaits are followed."""
 
     config: ContinuationConfig
     parameter: Parameter
     span: ValueSpan
 
     def start_values(self) -> list[float]:
-        """Return the values at which the search looks for gaits, the value in the config first."""
+        """Return the values at which the search looks for gaits. The config's value comes first if it is in the
+        span."""
         current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
         # A gait is most likely at the value in the config.
@@ -106,7 +107,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     for model in models_of(question):
         search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
-        # A branch may consist of a single point if it can be followed in neither direction.
+        # A branch that can be followed in neither direction consists of a single point.
         short = MIN_REACH * question.span.size
         isolated += [isolated_gait(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
@@ -130,7 +131,7 @@ def refuse(config: ContinuationConfig) -> None:
 
 
 def models_of(question: FamilyQuestion) -> tuple[str, ...]:
-    """Return the models whose gaits are followed.
+    """Return the models whose gaits are to be followed.
 
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
     of a span is invalid, or the second key equals the first or has a range without the value in the config.
@@ -160,7 +161,8 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
 
 
 def search_of(model: str, question: FamilyQuestion, progress: Progress) -> FamilySearch | None:
-    """Set up the search for a model's families, over both parameters if there are two, or None if no gait is found."""
+    """Set up the search for a model's families, over both parameters if there are two. Return None if no gait is
+    found."""
     seeding = SEEDS[model](question, progress)
     second = question.second
     block = question.config.continuation
@@ -220,7 +222,7 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 
 
 def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -> dict[str, Any]:
-    """Summarise the families, with values in the unit of the requested key. `again` is as in `run`."""
+    """Summarise the families. Parameter values are in the key's unit, and `again` is as in `run`."""
     config = question.config
     parameter = question.parameter
 
@@ -280,7 +282,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the lowest flip at which a one-step gait loses stability, or None if no gait loses it."""
+    """Return the lowest flip at which a one-step gait loses stability, or None if there is no such flip."""
     flips = [
         flip.value
         for branch in branches
@@ -301,8 +303,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Solve again for a sample of gaits at tighter tolerances. Return the largest changes, or None without a gait."""
-    # A simulation alone would not show the residual of Newton's method.
+    """Solve again for some gaits at tighter tolerances. Return the largest changes, or None if there is no gait."""
+    # A second simulation of the same gait would not show the error of Newton's method.
     step_map = family.step_map
     every = [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
@@ -324,9 +326,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
-    """Describe the branch ends at which walks fail because of the ground, and the crossings at which gaits trip over
-    pads.
-    """
+    """Describe where branches end because of the ground, and the crossings beyond which gaits trip over pads."""
     for branch in family.branches:
         gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
@@ -356,14 +356,14 @@ def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None
 
 
 def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Yield a row for each period-doubling cascade, with the ratios of the distances between its flips."""
+    """Yield a row for each period-doubling cascade, with the ratios of successive distances between its flips."""
     for first in family.branches:
         if any(is_born_in(first, flip, parent) for parent in family.branches for flip in parent.bifurcations):
             continue
         flips = chain(first, family.branches)
         if len(flips) > 1:
             ratios = feigenbaum_ratios(flips)
-            # Distances between flips shrink by the last ratio from here on, so they form a geometric series.
+            # From here on, distances between flips are assumed to shrink by the last ratio, as a geometric series.
             ends = {"accumulates_at": flips[-1] + (flips[-1] - flips[-2]) / (ratios[-1] - 1.0)} if ratios else {}
             yield {"period": first.period, "flips": flips, "ratios": ratios, **ends}
 
@@ -386,7 +386,7 @@ def is_born_in(child: GaitBranch, flip: bifurcations.Bifurcation, parent: GaitBr
 
 
 def attractor_summary(family: Family) -> dict[str, Any]:
-    """Describe the range over which an attractor was followed, and how it was lost.
+    """Describe over which range an attractor was followed, and how it was lost.
 
     Just beyond a flip, walks leave the gait slowly. A walk that has not repeated itself therefore counts as aperiodic
     only if neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
@@ -394,7 +394,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     attractors = family.attractors
     exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
-    # Gaits of longer periods than were followed are stable from the last flip to the limit of the cascade.
+    # From the last flip to the limit of the cascade, gaits of longer periods than those followed are stable.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
         attractor.value

@@ -32,8 +32,8 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
 SOLVED: Final = newton.Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
-FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; if it were coarser, noise would mislead the search
+DIFFERENCE: Final = 5e-3  # step, relative to the range of the bounds, of difference quotients of largest disturbances
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; at a coarser one, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
@@ -47,7 +47,7 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum.
 
-    checkpoint  results of searches that an earlier run completed, to which new results are added
+    checkpoint  results of the searches that an earlier run completed; new results are added
 
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
@@ -69,7 +69,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         progress.start(f"design: search {number + 1} of {design.starts}")
         name = f"search {number}"
         before = gaits.counts.copy()
-        # Otherwise the result of a search would depend on the searches before it.
+        # Otherwise the result of this search would depend on the searches before it.
         gaits.z = own_z
         if name in checkpoint.kept:
             entry = np.array(checkpoint.kept[name])
@@ -143,8 +143,8 @@ def refuse(config: DesignConfig) -> None:
         refuse_unread("design.over", key, config, (design.model,))
     current = [parameter.value_in(config) for parameter in parameters]
     bounds = list(design.over.values())
-    # Each bound must be valid together with the config's values of the other keys, or with all lower or all upper
-    # bounds.
+    # Each bound must be valid together with the config's values of the other keys, or all lower (or upper) bounds
+    # together.
     corners = np.column_stack((current, bounds)).T
     for index, parameter in enumerate(parameters):
         for bound in bounds[index]:
@@ -162,7 +162,7 @@ def keys_on_bound(design: analyses.Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters. Each search for a gait starts from the last gait found."""
+    """Computes gait and gradients at parameter values. Each search for a gait starts from the last gait found."""
 
     def __init__(
         self,
@@ -203,7 +203,7 @@ class Gaits:
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.gait_on_map()
         match = self.gait_near(standpoint, self.z)
-        # Newton's method may have failed because the last gait belongs to distant parameters.
+        # Newton's method may have failed because the last gait belongs to parameter values far away.
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = fixed_point.find_gaits(walker, config.seed).gait
@@ -223,16 +223,14 @@ class Gaits:
                 return None
             smooth = {name: of_key[name].value or 0.0 for name in self.wanted}
             by_key.append(smooth | self.differentiate_largest(subject, numbers, parameter, gap))
-        # Only one multiplier of each complex pair counts. Otherwise every pair would be a meeting.
+        # Only one multiplier of each complex pair counts, because the two of a pair always have equal magnitudes.
         moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
         apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
         gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}
         return Point(numbers, gradients, apart)
 
     def gait_near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
-        """Find the gait near z (d,) and its quantities, or return None if there is no gait or a quantity is
-        undefined.
-        """
+        """Find the gait near z (d,) and its quantities. Return None if there is no gait or a quantity is undefined."""
         step_map = standpoint_before.step_map
         cycle = gait_near(step_map, z, standpoint_before.p, SOLVED, step_map.stride)
         if isinstance(cycle, newton.NotConverged):
@@ -242,7 +240,7 @@ class Gaits:
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)
 
     def largest_disturbances(self, subject: ModelUnderTest, names: Collection[str]) -> dict[str, float]:
-        """Find the largest disturbances that a gait survives in either leg's step, by the names of `LARGEST`."""
+        """Find the largest disturbances that a gait survives in steps of both legs, by the names of `LARGEST`."""
         gaits = subject.quick_by_leg()
         return {
             name: min(largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for gait in gaits)

@@ -1,4 +1,4 @@
-"""Checks of the `identify` block that the stages `identify` and `plan` share: parameters, priors and models."""
+"""Check the parameters, priors and model of the `identify` block, for the stages `identify` and `plan`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -18,7 +18,8 @@ def refuse_model(config: reads.ContactConfig, block: identify.Identify) -> None:
 
 
 def refuse_keys(config: reads.ContactConfig, block: identify.Identify) -> None:
-    """Raise ConfigError for a key that is no parameter of the models, and for a value or prior that cannot be used."""
+    """Raise ConfigError for a key that is not a parameter of the models, and for a value or prior that cannot be
+    used."""
     refuse_values(config, "fit", block.fit, block.models)
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, block.models)
     for key, (value, sigma) in block.prior.items():

@@ -1,4 +1,5 @@
-"""Stored groups of gait families: branches with bifurcations, attractors, curves and sampled walks."""
+"""Build the groups in which families of gaits are stored: branches, bifurcations, attractors, curves and sampled
+walks."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -18,12 +19,12 @@ from walkerlab.pipeline.store.content import Group, Variable, columns, labelled,
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
-MOTIONS_OF_BRANCH = 12  # number of gaits per branch whose walks are stored
-MAX_MOTION_PERIOD = 4  # maximum period (steps) of these gaits
+MOTIONS_OF_BRANCH = 12  # maximum number of gaits per branch whose walks are stored
+MAX_MOTION_PERIOD = 4  # the walks of gaits with longer periods (steps) are not stored
 STRIDE = 2  # number of steps after which the legs have the same roles again
 TOLERANCES = registry.Tolerances("dop853", 1e-9, 1e-11, registry.ENDLESS)
 ALL_OUTPUTS: Final[tuple[schema.Output, ...]] = ("states", "energies", "forces")
-SAMPLE_STRIDE = 3  # every third sample between heel strikes is stored
+SAMPLE_STRIDE = 3  # of the samples between heel strikes, every third is stored
 
 MODEL = Label("", "model")
 KIND = Label("", "fold, flip or torus")
@@ -57,7 +58,7 @@ def groups(
     families: Sequence[family_search.Family], answer: Mapping[str, Any], config: reads.ContactConfig,
     parameter: Parameter, second: Parameter | None,
 ) -> dict[str, Group]:  # fmt: skip
-    """Build a group for each branch, each curve, and the bifurcations, exponents and attractor of each model.
+    """Build a group for each branch and curve, and for the bifurcations, exponents and attractor of each model.
 
     answer  summary of the stage, whose branches, bifurcations and curves are also stored as tables
     second  second parameter, if gaits are followed over a plane
@@ -108,7 +109,7 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """Bifurcation on a branch, with the index of the branch's point before it and the steps of the gait there."""
+    """Bifurcation on a branch: the index of the branch's point before it, and the steps of the gait at it."""
 
     after: int
     kind: str
@@ -131,7 +132,8 @@ def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
-                # A branch that was found from a seed may begin with another step of the gait than its parent does.
+                # A branch that was found from a seed may begin with another step of the gait than the branch from which
+                # it splits.
                 steps = [np.tile(values, 2) for values in (flip.gait.periods_s, flip.gait.angles)]
                 first = branch.points[0].periods_s
                 shift = min(range(parent.period), key=lambda k: float(np.abs(np.roll(steps[0], k) - first).max()))
@@ -142,7 +144,7 @@ def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
 def branch_group(
     branch: GaitBranch, marks: Sequence[Mark], monitors: Sequence[step_map.Monitor], value: Mapping[str, Label]
 ) -> Group:
-    """Build the group of a branch: its gaits in order, and its bifurcations.
+    """Build the group of a branch, with gaits and bifurcations in order.
 
     value  label of the parameter's values
     """
@@ -163,7 +165,8 @@ def branch_group(
 
 
 def motions(branches: Sequence[GaitBranch], config: reads.ContactConfig, parameter: Parameter) -> dict[str, Group]:
-    """Build groups such as branch_0/motion_7: sampled walks of a few gaits, evenly spread along each rigid branch."""
+    """Build groups such as branch_0/motion_7, the sampled walks of a few gaits, evenly spread along each rigid
+    branch."""
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
@@ -180,7 +183,7 @@ def motion(point: step_map.Cycle, period: int, config: reads.ContactConfig, para
         return
     scene = rigid_scene(changed, contact.Footholds(), ALL_OUTPUTS)
     unit, units = similarity.unit_walker(scene.walker)
-    # Gaits are followed for a walker of unit size.
+    # Points of a branch are states of a walker of unit size, so they are scaled to this walker.
     section = rigid_map.state_on_section(unit, point.z)
     n = len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))

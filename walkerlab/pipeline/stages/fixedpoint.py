@@ -1,4 +1,4 @@
-"""Periodic gaits of the rigid model, with the corrected equations and with those printed in the paper."""
+"""Find the periodic gaits of the rigid model, with the corrected equations and with those printed in the paper."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,7 +35,7 @@ NUMBERS = {
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "largest depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
-"""Labels of the fields of `RigidGait` that are stored and printed."""
+"""Labels of the fields of `RigidGait` that are stored and printed, by field."""
 KNEE_LABELS = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
@@ -43,7 +43,7 @@ STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Find the gaits of each set of equations.
 
-    again  whether to name nearby gaits if none is found, which takes a second
+    again  whether to suggest nearby gaits if none is found, which takes a second
 
     Raises NoAnswer if the set of equations in the config has no physical gait.
     """
@@ -73,7 +73,7 @@ def suggest_nearby(config: RigidConfig) -> str:
 
 
 def advice(config: RigidConfig) -> str:
-    """Return advice for a slope without a gait."""
+    """Return what to try on a slope without a gait."""
     walk_anyway = (
         f"to walk on this slope anyway, give a start state (start: [{', '.join(state_names(config))}]), and "
         "for the contact model's pads their pitch (contact.pad_pitch: a number)"
@@ -113,7 +113,7 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
 
 
 def labels_of_gait(gait: RigidGait) -> dict[str, Label]:
-    """Return the labels of a gait's quantities, with that of the knee strike for walkers with knees."""
+    """Return the labels of a gait's quantities, including the time of the knee strike for walkers with knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | KNEE_LABELS
 
 

@@ -106,7 +106,8 @@ def read_data(config: IdentifyConfig) -> MeasuredFile:
 
 
 def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification]) -> Identification:
-    """Fit each division of the walk into steps. Return the first good fit or, if none is good, the most usable one."""
+    """Fit every way to divide the walk into steps. Return the first good fit or, if none is good, the most usable
+    one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
     for measured in file.divisions():
@@ -125,12 +126,13 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
 def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Fit again if the identified slope, sensors or soles move the heel strikes. If that fails, keep the old fit."""
+    """Fit again if the heel strikes move with the identified slope, sensors or soles. If that fails, keep the old
+    fit."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
-    # Seen from the normal of the config's slope, both angles at a strike are off by the same error, that of slope and
-    # sensor.
+    # The sum of the angles at a strike is off by twice the error of an angle, which is that of slope and sensor
+    # together.
     touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
     same_soles = rigid_walker(identified).alike
     if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
@@ -144,7 +146,7 @@ def refit_with_new_strikes(
 
 
 def content_of(config: IdentifyConfig, result: Identification) -> Content:
-    """Build the content: estimates, steps and, for measured angles, residuals over the phase of a step."""
+    """Build the content to store: estimates, steps and, for measured angles, residuals over the phase of a step."""
     known = result.information
     block = config.identify or Identify()
     estimates = [
@@ -197,7 +199,8 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a prior and its distance from the estimate by the walk alone, in standard errors of the difference."""
+    """Return a row with a prior, and its distance from what the walk alone gives, in standard errors of the
+    difference."""
     return {
         "key": pull.key,
         "value": pull.value,
@@ -208,10 +211,10 @@ def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
 
 
 def worst_moves(known: Information) -> Floats | None:
-    """Return one-sigma changes (2, parameters) along the two parameter combinations that the walk determines worst.
+    """Return changes of one standard deviation along the two combinations of parameters that the walk determines worst.
 
-    The changes are independent and in the keys' units, the worst first. Returns None if the walk determines fewer than
-    two combinations.
+    The changes (2, parameters) are independent and in the keys' units, the worst first. Returns None if the walk
+    determines fewer than two combinations.
     """
     worst = known.directions[~is_open(known.singular_values)][-2:]
     if len(worst) < 2:
@@ -267,7 +270,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     """
     measured = result.measured
     walker = rigid_walker(config)
-    # The motion player shows the leg that swings first as leg 1.
+    # In the motion player, leg 1 is the one that swings first.
     walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
@@ -299,7 +302,8 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
-    """Return the masses in the config that were not fitted. The estimated masses are relative to them."""
+    """Return the masses that were not fitted but taken from the config, because the estimated masses are relative to
+    them."""
     # The contact model needs no reference, because the stiffness sets the scale of mass.
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}

@@ -61,7 +61,7 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 class MeasuredFile:
-    """Contents of the file that an `identify` block names, as steps or angles (`block.level`). The file is read once.
+    """Content of the file that an `identify` block names, as steps or angles (`block.level`). It is read only once.
 
     Raises ConfigError if it cannot be read.
     """
@@ -102,7 +102,7 @@ class MeasuredFile:
             raise problem
 
     def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
-        """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
+        """Divide the angles into steps, at instants when the sum of the leg angles is `touch_sum_rad`.
 
         config  config of the walker, or None for that of the file
         """
@@ -111,14 +111,14 @@ class MeasuredFile:
             raise ConfigError(
                 f"{self.path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk."
             )
-        # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
+        # The samples are taken from the recording, because `steps` has interpolated ones at heel strikes.
         angles = read_leg_angles(self.walk)[:, ::-1] if steps.swapped else read_leg_angles(self.walk)
         touches = np.append(0.0, steps.touch_time_s)
         measured = split_into_steps(self.walk.time_s - steps.origin_s, angles, touches, touch_sum_rad)
         return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
 
     def doubts(self) -> tuple[str, ...]:
-        """Describe, in sentences, the oddities of the angles and how they were handled."""
+        """Say in sentences what is odd about the angles, and how this was handled."""
         if self.steps is not None:
             return ()
         try:
@@ -145,7 +145,7 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
-    """Read the recording in the block's file. Return it with the smallest decimal place of its angles (rad).
+    """Read the recording in the block's file. Return it and the smallest decimal place of its angles (rad).
 
     The decimal place is 0 for angles that are computed from markers.
     """
@@ -194,7 +194,7 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
-    # On a treadmill the length of a step is the distance that the belt moves from touch to touch.
+    # On a treadmill, the length of a step is the distance that the belt moves from touch to touch.
     if block.belt_speed_m_s and "length_m" not in values:
         values["length_m"] = block.belt_speed_m_s * period
     if "touch_angle_rad" in values:
@@ -207,7 +207,8 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
 
 
 def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:
-    """Return a quantity (steps,) and its smallest decimal place, both in SI units, or None if it has no column.
+    """Return a quantity (steps,) and its smallest decimal place, both in SI units, or None if the table has no column
+    for it.
 
     Raises ConfigError for gaps and bad values.
     """

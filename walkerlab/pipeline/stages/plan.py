@@ -166,13 +166,13 @@ Errors = tuple[dict[str, float | None], tuple[result.Unidentifiable, ...]]
 def predict_measured(
     subject: ModelUnderTest, question: identify.Identify, plan: analyses.Plan
 ) -> tuple[measurements.MeasuredWalk, measurements.MeasuredWalk]:
-    """Predict the measurements of a walk from the subject's state z.
+    """Predict the step values and the sampled angles of a walk that starts in the state z of `subject`.
 
     Raises NoAnswer if the walk ends early.
     """
     family = identification.ConfigFamily(subject.config, question.keys)
     walks = identification.step_map_of(subject, family)
-    # The walk has one more step than is measured, because samples must lie before its last heel strike.
+    # The walk has one step more than are measured, because samples must lie before its last heel strike.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
@@ -191,7 +191,7 @@ def predict_measured(
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """Predicted walk, which has not been measured, with derivatives."""
+    """Walk that is predicted, not measured, with its derivatives."""
 
     forecast: prediction.Forecast
     data: mixed_model.Linearised
@@ -222,7 +222,8 @@ def walk_of(subject: ModelUnderTest, measured: measurements.MeasuredWalk, questi
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: analyses.Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain if `measured` quantities of the first steps are known, and open combinations."""
+    """Return the errors that remain if `measured` quantities of the first steps are known, and which combinations are
+    open."""
     noise = {
         measurements.STEP_PERIOD: plan.period_noise_s,
         measurements.STEP_LENGTH: plan.length_noise_m,

@@ -1,4 +1,4 @@
-"""Stored groups of a rigid walk: its steps, and samples over time."""
+"""Build the groups in which a rigid walk is stored: its steps, and samples over time."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from walkerlab.scene.rigid import RigidScene
 
 
 def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
-    """Return the non-empty groups of a walk by name."""
+    """Return the groups of a walk by name, without empty ones."""
     stored = {}
     if walk.steps:
         set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
@@ -28,7 +28,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 
 
 def rolled_distance(walker: RigidModel, turned: Any) -> Any:
-    """Return the distances (m) that the stance foot has rolled once its leg has turned back by the angles `turned`."""
+    """Return how far (m) the stance foot has rolled when its leg has turned back by the angles `turned`."""
     return walker.radius * turned
 
 

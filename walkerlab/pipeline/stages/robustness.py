@@ -46,7 +46,8 @@ STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """Maximum total number of steps of all walks on ground of one roughness, by model."""
 PUSH_REACTIONS: Final = ("normal_impulse_N_s", "min_normal_force_N")
-"""Names of the values that `RigidMap.ground_after_push` returns: ground reactions during and after a push."""
+"""Names of the ground reactions during and after a push, in the order in which `RigidMap.ground_after_push` returns
+them."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 INDICATOR_UNITS: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
@@ -102,7 +103,7 @@ def run(
 ) -> Content:
     """Study the robustness of the gait of each model.
 
-    checkpoint  disturbances and walks that an earlier run computed
+    checkpoint  results of the disturbances and walks that an earlier run computed
     jobs        maximum number of processes
 
     Raises ConfigError for an invalid request.
@@ -115,7 +116,7 @@ def run(
     steps = {}
     for subject in subjects(config, inputs, progress):
         gait = subject.gait_on_map()
-        # The rigid model's gradients and largest disturbances take less time than the start of a process.
+        # With the rigid model, gradients and largest disturbances take less time than the start of a process.
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_quantities(gait)
         assert numbers is not None, "a gait has quantities"
@@ -131,7 +132,7 @@ def run(
         label = f"robustness: {subject.model} model"
         units = [*single_disturbance_units(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
-        # All kernels are compiled, because the quantities of the gait have been computed.
+        # Computing the quantities of the gait has compiled all kernels.
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         target = {"steps": config.robustness.steps}
         for each in gaits:
@@ -218,7 +219,8 @@ def norms(beginning: Mapping[str, Any], gait: GaitOnMap) -> Iterator[dict[str, A
 
 
 def single_disturbance_units(subject: ModelUnderTest, config: RobustnessConfig, legs: int) -> Iterator[WorkUnit]:
-    """Yield the work units that search for the largest floor drop and hip push, each in both directions, by leg."""
+    """Yield the work units that search for the largest change of the floor and hip push, for both signs and each
+    leg."""
     for leg in range(legs):
         for disturbance, sign in LARGEST.values():
             run = partial(single_of, subject, leg, disturbance, sign, config.robustness.steps)
@@ -226,8 +228,8 @@ def single_disturbance_units(subject: ModelUnderTest, config: RobustnessConfig, 
 
 
 def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Return the largest survived disturbance of one sign. For a hip push in the rigid model, also return ground
-    reactions.
+    """Return the largest disturbance of one sign that the gait survives. For a hip push in the rigid model, add the
+    ground reactions.
     """
     size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
     gait = subject.gait_on_map().split_by_leg()[leg]
@@ -286,7 +288,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
-    """Summarise the step counts (roughness, walk) for each roughness of the ground."""
+    """Return a row for each roughness of the ground, which summarises the step counts `steps` (roughness, walk)."""
     most = cap(model, config)
     rows = []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
@@ -324,14 +326,15 @@ def sensitivities(
 
 
 def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
-    """Return the derivatives with respect to one key, without cost of transport for a passive walker."""
-    # The cost of transport of a passive walker is the sine of the slope, whatever its parameters.
+    """Return the derivatives with respect to one key. For a passive walker, omit that of the cost of transport."""
+    # The cost of transport of a passive walker is the sine of the slope, whatever the walker's parameters are.
     omitted = () if drives_of(subject.config) else ("cost_of_transport",)
     names = [name for name in GAIT_QUANTITIES if name not in omitted]
     return subject.gradients(parameter_of(key, subject.config), names)
 
 
 def parameters_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, among all or among those requested."""
+    """Return the dotted keys of the parameters that the model reads, of those requested or, if `requested` is None, of
+    all."""
     selection = parameter_keys(subject.config) if requested is None else requested
     return tuple(key for key in selection if model_reads(subject.model, subject.config, key))

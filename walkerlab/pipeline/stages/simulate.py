@@ -1,4 +1,4 @@
-"""Walk of the rigid model from its fixed point or a given start."""
+"""Simulate a walk of the rigid model from its fixed point or a given start."""
 
 from collections.abc import Mapping
 from functools import partial

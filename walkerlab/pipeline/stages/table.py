@@ -1,4 +1,4 @@
-"""Built-in stages, divided into walks and questions. Each declares its part of the config, its options and inputs.
+"""Declare the built-in stages, walks and questions, with their parts of the config, options and inputs.
 
 The command line builds its help from this file, so the file imports no stage, no config schema and no NumPy.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def check_laws(config: "Config") -> None:
-    """Raise ConfigError for an incomplete law of another package, before anything is compiled."""
+    """Raise ConfigError if a law of another package is incomplete, before anything is compiled."""
     contact = config.contact
     if config.walker.hip.hinge_law not in WORDS["hinge_law"]:
         load("walkerlab.scene.parts:hinge_law_of")(config.walker)

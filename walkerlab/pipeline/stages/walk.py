@@ -1,8 +1,8 @@
 """Parts shared by the stages that compute walks: start, stored groups, summary and numerical error.
 
-Both models store a walk with the same names, shapes and meanings. Quantities that a model lacks are absent. Long walks
-are thinned: all samples of the first and last steps are stored, fewer of the others. The numerical error is the change
-of a walk's quantities at tighter tolerances.
+Both models store a walk with the same names, shapes and meanings, but without quantities that the model lacks. Of a
+long walk, all samples of the first and last steps are stored, and fewer of the others. The numerical error is the
+change of a walk's quantities at tighter tolerances.
 """
 
 import math
@@ -29,10 +29,10 @@ from walkerlab.scene.rigid import first_step_length, have_different_legs
 
 MIN_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
-BUDGET_FACTOR: Final = 10  # the evaluation budget is multiplied by this at tighter tolerances
+BUDGET_FACTOR: Final = 10  # factor by which the evaluation budget grows at tighter tolerances
 SAMPLE: Final = 16  # maximum number of walks to repeat
 DEFAULT_TIGHTENING: Final = TIGHTER[100.0]
-ROUNDING: Final = 1e-6  # relative difference from a divided tolerance that counts as rounding
+ROUNDING: Final = 1e-6  # tolerances that differ by less than this (relative) are equal but for rounding
 
 Summary = Mapping[str, Any]
 Values = Sequence[float | None]
@@ -55,7 +55,8 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances with more budget, or another method if they cannot be tightened, and a description."""
+    """Return tighter tolerances with more budget (or another method, if they cannot be tightened), and a
+    description."""
     tolerances = replace(tolerances, budget=min(BUDGET_FACTOR * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
@@ -75,7 +76,7 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
     later = steps_later(first, second)
     for key, name in ERROR_OF_EACH_STEP.items():
         apart = step_changes(first.get(key) or (), second.get(key) or (), first.get("repeats_after") or 0, later)
-        if np.isfinite(apart).any() and any(first[key]):  # zeros of point feet
+        if np.isfinite(apart).any() and any(first[key]):  # point feet have only zeros
             changes[name] = float(np.nanmax(apart))
             of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
     changes["end_time_s"] = abs(first["end_time_s"] - second["end_time_s"])
@@ -87,7 +88,8 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
 
 
 def steps_later(first: Summary, second: Summary) -> int | None:
-    """Return by how many steps the cycle of the second walk lags behind that of the first, or None without a cycle."""
+    """Return by how many steps the cycle of the second walk lags behind that of the first, or None if there is no
+    cycle."""
     period = first.get("repeats_after") or 0
     if not period or second.get("repeats_after") != period:
         return None
@@ -96,16 +98,16 @@ def steps_later(first: Summary, second: Summary) -> int | None:
 
 
 def step_changes(first: Values, second: Values, period: int, later: int | None) -> Floats:
-    """Return the largest change of the values (steps,) up to each step, or NaN where a walk has no value.
+    """Return the largest change of the values (steps,) up to each step, with NaN where a walk has no value.
 
-    period  steps after which the first walk repeats in the end, or 0
-    later   delay (steps) with which the second walk takes the same steps, or None if it does not repeat
+    period  number of steps after which the end of the first walk repeats itself, or 0
+    later   number of steps by which the second walk's cycle lags behind, or None if it has no cycle
 
     Rounding decides at which step a walk begins to repeat itself. So the steps of a walk that has settled are compared
-    with the same steps of the cycle, even if these come later. If the second walk has not settled yet, the error of
-    the cycle is estimated by that of one step.
+    with the same steps of the cycle, even if these come later. If the second walk has not settled yet, the error of one
+    step is the estimate for the whole cycle.
     """
-    # The lists may differ in length: slips lack the last step if its foot has not lifted.
+    # The lists may differ in length: slips lack the last step of a walk if the foot has not lifted.
     count = min(len(first), len(second))
     values, others = (np.array(each[:count], float) for each in (first, second))
     changes = np.abs(values - others)
@@ -114,7 +116,7 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
         return largest
     end = count - 1 - (later or 0)
     steps = np.arange(count)
-    last = end - (end - steps) % period  # the last step with a counterpart in the second walk
+    last = end - (end - steps) % period  # the last step that the second walk has, too
     between = changes[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
 
@@ -125,9 +127,9 @@ def evenly_spread(count: int, wanted: int) -> list[int]:
 
 
 FIRST_STEPS = 200
-"""Every sample is stored in this many steps at the start of a walk."""
+"""Number of steps at the start of a walk of which every sample is stored."""
 LAST_STEPS = 20
-"""Every sample is stored in this many steps at the end of a walk."""
+"""Number of steps at the end of a walk of which every sample is stored."""
 MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 MIN_REPEATED = 4
@@ -135,7 +137,7 @@ MIN_REPEATED = 4
 MAX_REPEATED = 32
 """Number of steps at the end of a walk that are tested for repetition, or a quarter of all steps if that is more."""
 FEWEST_SETTLED = 8
-"""Repetition is looked for in at least this many of the last steps."""
+"""Minimum number of last steps in which repetition is looked for."""
 REPEATED = 1e-5
 """Steps repeat if they differ by less than this, as a fraction of the first step."""
 REPEATED_AFTER_SETTLING = 1e-2
@@ -163,7 +165,7 @@ STEP_LABELS: Final = {
     "state_before": Label("rad, rad/s", "state just before the touch", (COORDINATE,)),
     "state_after": Label("rad, rad/s", "state just after the touch, roles exchanged", (COORDINATE,)),
 }
-# Columns with missing values where a knee does not lock or the last stance foot does not lift.
+# Columns whose value is missing if a knee does not lock, or if the last stance foot does not lift.
 INCOMPLETE_COLUMNS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
 TIME_LABELS: Final = {
     "time": Label("s", "time"),
@@ -230,7 +232,7 @@ def content_of_walk(
     progress: Progress,
     again: bool,
 ) -> Content:
-    """Simulate a walk, store samples (thinned for long walks), and repeat it to measure the numerical error.
+    """Simulate a walk, choose the samples to store, and repeat the walk to measure the numerical error.
 
     walk     takes tolerances and whether to sample, and returns a `WalkRecord` with `samples`
     groups   returns the groups of a walk to store
@@ -253,7 +255,7 @@ def content_of_walk(
 
 
 def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
-    """Return the samples to store: all samples of an ordinary walk, fewer of a long one.
+    """Return the samples to store: all of an ordinary walk, but fewer of a long one.
 
     samples  a NamedTuple of arrays whose first axis is time, `time_s` among them
     ends     (steps,) s, times at which steps ended
@@ -280,7 +282,8 @@ def select_samples(samples: Any, mask: NDArray[Any]) -> Any:
 
 
 def variables_over_time(**values: ArrayLike) -> dict[str, Variable]:
-    """Build variables over time from values (samples,), or (samples, 2) by leg, named by the keys of `TIME_LABELS`."""
+    """Build variables over time from values (samples,) or, by leg, (samples, 2), which are named as in
+    `TIME_LABELS`."""
     return {
         name: labelled(column, TIME_LABELS[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()
     }
@@ -348,7 +351,7 @@ def drive_measures(walk: WalkRecord) -> dict[str, Any]:
 
 
 def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
-    """Return how a walk on even ground settles.
+    """Return how the end of a walk on even ground repeats, and when the walk leaves its gait.
 
     repeats_after  steps after which the last steps repeat, 0 if they do not
     leaves_gait_at  number of the step with which a walk leaves the gait on which it starts, or None if it stays or
@@ -369,7 +372,7 @@ def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
 def steps_to_repeat_last(steps: Floats) -> int:
     """Return the number of steps after which the end of a walk (steps, n) repeats itself, or 0 if it does not.
 
-    Of several such numbers, it is the one that holds over the longest part.
+    If there are several such numbers, it is the one that holds over the longest part of the walk.
     """
     longest = max(MAX_REPEATED, len(steps) // 4)
     ends = (longest >> halvings for halvings in range(longest.bit_length()))
@@ -378,11 +381,11 @@ def steps_to_repeat_last(steps: Floats) -> int:
 
 
 def steps_to_repeat(steps: Floats) -> int:
-    """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat, or 0 if never."""
+    """Return the number of steps after which relative values of steps (steps, n) repeat, or 0 if they do not."""
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         difference = np.abs(steps[period:] - steps[:-period]).max()
-        # A walk that settles slowly, alternating about its limit, almost repeats after two steps without being a cycle.
+        # A walk that alternates about its limit and settles slowly almost repeats after two steps, but is no cycle.
         if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0
@@ -416,7 +419,7 @@ def last_stride(walk: WalkRecord) -> dict[str, Any]:
     """Return both steps of a walk's last stride and their differences, or an empty mapping without a stride."""
     if walk.steps < STRIDE:
         return {}
-    count = walk.steps - walk.steps % STRIDE  # leg 1 swings in the first step of a stride
+    count = walk.steps - walk.steps % STRIDE  # even, because leg 1 swings in the first step of a stride
     periods, lengths = (values[count - STRIDE : count].tolist() for values in (walk.periods_s, walk.lengths_m))
     return {
         "gait_steps": [
@@ -441,7 +444,8 @@ def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return period (s), length (m) and knee strike time (s) of a walk's last step, each None if it does not exist."""
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step. A value that does not exist is
+    None."""
     periods = walk["step_periods_s"]
     lengths = walk["step_lengths_m"]
     strikes = walk.get("knee_strike_times_s")

@@ -25,7 +25,7 @@ DIGEST: Final = re.compile("[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class Identity:
-    """Everything that determines a stage's result."""
+    """Everything on which a stage's result depends."""
 
     stage: str  # name of the stage
     config_slice: Mapping[str, Any]  # keys of the config that the stage reads, with their values
@@ -35,7 +35,7 @@ class Identity:
 
     @property
     def key(self) -> str:
-        """Stage key: sha256 of all fields except the name. The order of keys does not matter."""
+        """Stage key: the sha256 of all fields but the stage's name. The order of keys does not matter."""
         parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
         return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
@@ -55,7 +55,7 @@ def changed_parts(old: Identity, new: Identity) -> list[str]:
 
 
 def differences(where: str, old: Any, new: Any) -> Iterator[str]:
-    """Iterate over the differing values of two config slices, as text such as 'walker.leg_mass_kg 5.0 -> 6.0'."""
+    """Yield the differences of two config slices as texts such as 'walker.leg_mass_kg 5.0 -> 6.0'."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for name in sorted({*old, *new}):
             yield from differences(f"{where}.{name}" if where else name, old.get(name), new.get(name))
@@ -76,8 +76,8 @@ NOT_THERE = "not there yet"
 LIMIT_BYTES = 1 << 30
 """Maximum size of an artifact. Larger files are not read."""
 
-# The seal follows the HDF5 data. It reveals damaged files before the HDF5 library reads them, because some of them make
-# the library free memory twice.
+# The seal follows the HDF5 data. It reveals a damaged file before the HDF5 library reads it, because some damaged files
+# make the library free memory twice.
 SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
 SEAL_BYTES = 83
 
@@ -87,7 +87,7 @@ NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""Attributes at the root of every artifact. Content with arrays at the root may add others."""
+"""Names of the attributes at the root of every artifact. Content with arrays at the root may add others."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
@@ -95,7 +95,8 @@ class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure 
 
 
 class OtherLayout(Damaged):
-    """Error for an artifact in another program version's layout. Callers skip it without a warning."""
+    """Error for an artifact whose layout is that of another version of the program. Callers skip it without a
+    warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -119,7 +120,7 @@ class Lookup:
 
     accepted: bool
     reason: str  # reason for rejecting the file; empty if it is accepted
-    artifact: Stored | None = None  # the artifact as read, even if its key differs; None if missing or damaged
+    artifact: Stored | None = None  # the file's content, even if the key differs; None if missing or damaged
     damaged: bool = False  # whether the file exists but cannot be trusted
 
 
@@ -141,7 +142,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
 @dataclass(frozen=True)
 class InTurn:
-    """Content with one group whose variables are built one by one, to save memory."""
+    """Content with a single group, whose variables are built one by one to save memory."""
 
     summary: Mapping[str, Any]
     attrs: Mapping[str, Attribute]
@@ -207,9 +208,7 @@ def read(path: Path) -> Stored:
 
 
 def check(path: Path, key: str | None = None, stage: str | None = None) -> Lookup:
-    """Check that the file at `path` is intact and belongs to `key` and `stage`, if these are given. This
-    never raises.
-    """
+    """Check that the file at `path` is intact and, if they are given, belongs to `key` and `stage`. Raises no error."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -273,7 +272,7 @@ FILES_GROUP = "files"
 
 
 def index_files(folder: Path, files: Iterable[Path]) -> Group:
-    """Build the group that lists files below a run folder, for storage under the name `FILES_GROUP`.
+    """Build the group that lists files below a run folder. It is stored under the name `FILES_GROUP`.
 
     Raises ValueError for a file outside the folder and FileNotFoundError for a missing one.
     """
@@ -290,7 +289,7 @@ def index_files(folder: Path, files: Iterable[Path]) -> Group:
 
 
 def indexed_files(content: Content) -> dict[str, str]:
-    """Return the digest of each listed file by path in the run folder, or nothing if the content has no list."""
+    """Return the digest of each listed file, by path in the run folder, or {} if the content has no list."""
     group = content.groups.get(FILES_GROUP)
     return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
 

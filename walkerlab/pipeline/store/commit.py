@@ -1,6 +1,6 @@
 """Find the commit of a checkout (from git) or of an installed package (recorded by its build).
 
-Uses the standard library alone: the build loads this file before anything is installed.
+This file imports only the standard library, because the build loads it before anything is installed.
 """
 
 import importlib.metadata
@@ -15,7 +15,8 @@ SHIPPED = ("walkerlab", "configs")
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, with '-dirty' if package files have changed, or None outside a checkout."""
+    """Return the commit of a source tree, followed by '-dirty' if package files have changed, or None if it is no
+    checkout."""
     # Without this check, git would report the commit of another checkout that contains the environment.
     if not (root / ".git").exists():
         return None
@@ -26,7 +27,8 @@ def commit_of_checkout(root: Path) -> str | None:
 
 
 def commit_of_installation(package: Path) -> str | None:
-    """Return the commit that an installed package was built from, or None if unknown or not installed."""
+    """Return the commit from which an installed package was built, or None if it is unknown or there is no such
+    package."""
     try:
         installed = importlib.metadata.distribution(package.name)
     except importlib.metadata.PackageNotFoundError:
@@ -37,7 +39,8 @@ def commit_of_installation(package: Path) -> str | None:
 
 
 def commit_of_package(package: Path) -> str | None:
-    """Return the commit that the package in a folder runs from or was built from, or None if unknown."""
+    """Return the commit of the source from which the package in a folder runs or was built, or None if it is
+    unknown."""
     return commit_of_checkout(package.parent) or commit_of_installation(package)
 
 

@@ -1,4 +1,4 @@
-"""Content of results: a summary, and labelled arrays in groups, built from rows, independent of files and HDF5."""
+"""Content of results: a summary, and labelled arrays in groups. It knows nothing of files and HDF5."""
 
 import hashlib
 import math
@@ -18,7 +18,7 @@ from walkerlab.labels import Label
 Attribute = str | int | float | bool
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
-"""Pattern of names that HDF5, netCDF and xarray accept unquoted for groups, variables, dimensions and attributes."""
+"""Pattern of the names of groups, variables, dimensions and attributes that HDF5, netCDF and xarray accept."""
 
 
 STORED_AS: dict[str, type] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
@@ -34,8 +34,8 @@ class Variable:
     Raises ValueError or TypeError for values that cannot be stored faithfully.
     """
 
-    values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
-    # Name of each axis. A variable with the name of its only dimension is the coordinate of that dimension.
+    values: NDArray[Any]  # finite numbers, bools or texts; they are copied, widened to 64 bits and frozen
+    # Name of each axis. A variable that is named like its only dimension is the coordinate of that dimension.
     dims: tuple[str, ...]
     units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text
     long_name: str  # meaning, as shown on axes and in tables
@@ -106,10 +106,10 @@ class Content:
 
     # Groups by path, such as 'corrected/gaits' ('' for the root of the file). Missing parent groups are added.
     groups: Mapping[str, Group] = field(default_factory=dict)
-    # Values that `--json` prints, in SI units. 'wall_s' and keys that end in '_wall_s' count as timings.
+    # The values that `--json` prints, in SI units. 'wall_s' and keys that end in '_wall_s' count as timings.
     summary: Mapping[str, Any] = field(default_factory=dict)
     timed: tuple[str, ...] = ()  # further top-level keys of the summary that depend on timings, such as 'best'
-    # False for the partial results of a stage that found no answer. The reason is under `no_answer` in the summary.
+    # False for partial results of a stage that found no answer, whose summary has the reason under `no_answer`.
     complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -133,7 +133,7 @@ class Content:
 
     @property
     def no_answer(self) -> NoAnswer | None:
-        """Reason why the stage has no answer, with advice, or None if it has one."""
+        """Error that says why the stage has no answer, with advice, or None if it has one."""
         reason = self.summary.get("no_answer", {})
         return None if self.complete else NoAnswer(reason.get("message", "no answer"), reason.get("advice", ""))
 
@@ -240,7 +240,7 @@ def plain(value: Any) -> Any:
 
 
 def remove_timings(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the summary without timings at any depth."""
+    """Return the summary without timings, at any depth."""
 
     def inner(value: Any) -> Any:
         if isinstance(value, Mapping):
@@ -251,12 +251,12 @@ def remove_timings(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> d
 
 
 def labelled(values: ArrayLike, label: Label, *dims: str, gaps: bool = False) -> Variable:
-    """Build a variable from values with dimensions `dims`, followed by those of the label."""
+    """Build a variable from values whose dimensions are `dims`, then those of the label."""
     return Variable(np.asarray(values), (*dims, *label.dims), label.unit, label.text, label.timing, gaps)
 
 
 def columns(rows: Sequence[Any], labels: Mapping[str, Label], dim: str) -> dict[str, Variable]:
-    """Build one variable per label, from the attribute or key of the same name in each row."""
+    """Build one variable per label, from the attribute or key of that name in each row."""
     of: Any = getitem if rows and isinstance(rows[0], Mapping) else getattr
     return {label.name or name: column([of(row, name) for row in rows], label, dim) for name, label in labels.items()}
 
@@ -292,11 +292,12 @@ def rows_group(rows: Sequence[Any], labels: Mapping[str, Label], dim: str = "row
 Array = NDArray[np.float64]
 
 UNEVEN = "foothold_height_m"  # name of the variable with the foothold heights, stored only on uneven ground
-FAR_EDGE_M = 1e6  # m; the first level begins this far behind the first foothold, so that it fills any drawing
+FAR_EDGE_M = 1e6  # m; the first level begins this far behind the first foothold, beyond the edge of any drawing
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Return where each ground level begins along the slope, and the height (m). Levels meet midway between footholds.
+    """Return the positions (m) along the slope at which ground levels begin, midway between footholds, and their
+    heights (m).
 
     steps  stored group of the walk's steps
 

@@ -1,7 +1,9 @@
-"""Files: atomic writing, errors of the file system, CSV that is safe to open in a spreadsheet, and checkpoints.
+"""Write files atomically, explain errors of the file system, format CSV that is safe in a spreadsheet, and keep
+checkpoints.
 
-A checkpoint is a journal next to the artifact, from which an interrupted run resumes: first the key of the result, then
-a line for each unit of work, each with a checksum. Lines are only appended. An incomplete last line is dropped.
+A checkpoint is a journal next to the artifact, from which an interrupted run resumes. The first line is the key of the
+result, and one line follows for each unit of work. Every line has a checksum. Lines are only appended, and an
+incomplete last line is dropped.
 """
 
 import contextlib
@@ -50,7 +52,7 @@ def storing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def storage_errors(folder: Path) -> Iterator[None]:
-    """Convert an OSError for which `ADVICE` exists, such as a full disk, to a StorageError about `folder`.
+    """Convert an OSError for which there is `ADVICE`, such as that of a full disk, to a StorageError about `folder`.
 
     Other errors of the `with` block are raised unchanged.
     """
@@ -79,10 +81,10 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
 
 def write_numbered(path: Path, text: str) -> Path:
-    """Write a text to a path, and return the path.
+    """Write a text to a path that does not hold another text, and return this path.
 
-    If the path holds another text, the next free `name-2`, `name-3`, ... is used. A file that holds the same text is
-    kept. Raises StorageError if the file cannot be written.
+    If `path` holds another text, the next free one of `name-2`, `name-3`, ... is used. A file that holds the same text
+    is kept. Raises StorageError if the file cannot be written.
     """
     for number in itertools.count(1):
         place = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
@@ -114,7 +116,7 @@ def write_through(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Lend a `with` block a temporary file that replaces `path` at the end. After a failure `path` is unchanged.
+    """Give a `with` block a temporary file that replaces `path` at the end. After an error, `path` is unchanged.
 
     Raises StorageError if the file cannot be written.
     """
@@ -131,7 +133,7 @@ def replacing(path: Path) -> Iterator[Path]:
             # The temporary file is still there after a failure, or if it was a hard link to `path` itself.
             with contextlib.suppress(OSError):
                 temporary.unlink()
-        if hasattr(os, "O_DIRECTORY"):  # other systems cannot flush a folder's entries
+        if hasattr(os, "O_DIRECTORY"):  # the entries of a folder can be flushed only on these systems
             descriptor = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
             try:
                 os.fsync(descriptor)
@@ -140,7 +142,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Try a temporary file of `size` bytes, and raise OSError if the disk has no room for it."""
+    """Raise OSError if the disk has no room for `size` bytes, by trying to create a temporary file of this size."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -176,7 +178,8 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
 
 def file_digest(path: Path) -> str | None:
-    """Return the sha256 of a file, or None if it cannot be read, or is a pipe or device, which might never end."""
+    """Return the sha256 of a file, or None if it cannot be read. Pipes and devices are not read, as they might never
+    end."""
     try:
         if not path.is_file():
             return None
@@ -196,7 +199,7 @@ def remove_leftovers(folder: Path) -> list[Path]:
 
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""Pattern of the first character of texts that a spreadsheet would evaluate."""
+"""Pattern of texts that a spreadsheet would evaluate, by their first character."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
@@ -221,7 +224,7 @@ Numbers = list[float]
 
 
 class Checkpoint:
-    """Numbers computed by the completed work units of one result, by name of the unit."""
+    """Numbers that the completed work units of a result have computed, by name of the unit."""
 
     def __init__(self, path: Path | None, key: str) -> None:
         """Resume from the journal at `path` if its key matches, otherwise start over with the first unit.
@@ -231,7 +234,7 @@ class Checkpoint:
         self.path = path
         self.key = key
         self.kept: dict[str, Numbers] = {}
-        self._intact = 0  # number of valid bytes in the file
+        self._intact = 0  # number of valid bytes at the beginning of the file
         with contextlib.suppress(OSError, ValueError, TypeError):  # the last line may be incomplete
             lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
             for text in lines if lines[:1] == [line([key])] else []:

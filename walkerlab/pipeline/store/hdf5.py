@@ -1,4 +1,4 @@
-"""Conversion of content to and from the bytes of HDF5 files that xarray can open."""
+"""Convert content to and from the bytes of HDF5 files that xarray can open."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.store.content import Attribute, Group, Variable
 
-# Text by which netCDF readers recognise a dimension without a coordinate. The length is appended.
+# Text by which netCDF readers recognise a dimension without a coordinate. The dimension's length is appended to it.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""
 ENCODING = "_Encoding"
 """Attribute by which xarray decodes text."""
 MIN_TEXT_BYTES = 2
-"""Minimum length of text in arrays. Texts of one byte would be joined by netCDF readers along the last dimension."""
+"""Minimum length of text in arrays. If it were one byte, netCDF readers would join the texts along the last
+dimension."""
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
 MIN_MEMBER_BYTES = 32
-"""Each member of a group takes at least this many bytes. So the size of a file bounds the number of its members, even
-if links are circular.
+"""Minimum number of bytes that a member of a group takes in a file. The size of the file therefore limits the number of
+members, even if links are circular.
 """
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
-    """Build an HDF5 file in memory, so that only an ordinary write, not the HDF5 library, can fail on a full disk."""
+    """Build an HDF5 file in memory. Thus only an ordinary write can fail on a full disk, not the HDF5 library."""
     # No file named "image" is created: the memory driver has no backing store.
     with h5py.File("image", "w", driver="core", backing_store=False, track_order=True) as file:
         write_attributes(file, root)
@@ -138,7 +139,7 @@ def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
 
 
 def write_attributes(holder: Any, attributes: Mapping[str, Attribute]) -> None:
-    """Write attributes in order. Text is UTF-8 of fixed length, as in every netCDF file."""
+    """Write attributes in order. Text is stored as UTF-8 of fixed length, as in every netCDF file."""
     for name, value in attributes.items():
         if isinstance(value, str):
             data = value.encode()
@@ -158,7 +159,7 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
 
 
 class Budget:
-    """Number of bytes that the remaining datasets may declare, since a file cannot hold more data than its size."""
+    """Number of bytes that the datasets not yet read may declare. A file cannot hold more data than its size."""
 
     def __init__(self, size: int) -> None:
         """Set the budget to the size of the file, in bytes."""
@@ -175,7 +176,7 @@ class Budget:
 
 
 def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, Group]]:
-    """Iterate over all groups below a group by path, children first."""
+    """Yield all groups below a group with their paths, children first."""
     if path.count("/") >= MAX_LEVELS:
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
@@ -202,7 +203,8 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Return names by address in the file. HDF5 itself would search the whole file for the name of a scale."""
+    """Return the names of a group's members by their addresses, because HDF5 would search the whole file for such a
+    name."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
@@ -241,7 +243,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read the strings of a dataset. Those of layout 2 have variable lengths."""
+    """Read the strings of a dataset. In files of layout 2, they have variable lengths."""
     if h5py.check_string_dtype(dataset.dtype).length is None:
         return read_variable_strings(dataset, budget)
     texts = np.asarray(dataset[()])
@@ -253,7 +255,8 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read strings a few at a time, so that the budget also catches many references to one long string."""
+    """Read strings of variable length a few at a time, so that the budget also stops many references to one long
+    string."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)

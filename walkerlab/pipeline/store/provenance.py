@@ -1,4 +1,4 @@
-"""Provenance of results: software, machine, time and command. It is recorded but is not part of the key."""
+"""Record the provenance of results: software, machine, time and command. A result's key does not depend on it."""
 
 import datetime
 import importlib.metadata
@@ -31,7 +31,7 @@ class Provenance:
     platform: str  # operating system, processor, Python
     package_version: str
     library_versions: Mapping[str, str]
-    # commit of the source tree that the package runs from or was built from, '-dirty' if changed; None if unknown
+    # commit of the source from which the package runs or was built, with '-dirty' if that was changed; None if unknown
     git_commit: str | None = None
     input_digests: Mapping[str, str] = field(default_factory=dict)  # digest of each input's content, by stage
 
@@ -76,7 +76,8 @@ def utc_now() -> str:
 
 
 def library_versions() -> dict[str, str]:
-    """Return versions of the installed libraries from their metadata, importing none, and of extensions."""
+    """Return the versions of extensions and of installed libraries. They come from metadata, so no library is
+    imported."""
     versions = {}
     for name in LIBRARIES:
         try:
@@ -87,5 +88,5 @@ def library_versions() -> dict[str, str]:
 
 
 def git_commit() -> str | None:
-    """Return the commit that this package runs from or was built from, or None if unknown."""
+    """Return the commit of the source from which this package runs or was built, or None if it is unknown."""
     return commit.commit_of_package(Path(walkerlab.__file__).parent)

@@ -1,4 +1,4 @@
-"""Runs: their folders with files and locks, and their configs and results."""
+"""Runs: their folders, files and locks, and the configs and results in them."""
 
 import contextlib
 import datetime
@@ -34,7 +34,8 @@ RECORD_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Record:
-    """Name and config of a run. They are recorded because results taken over from another run hold its config."""
+    """Name and config of a run. They are recorded in the folder, because a result may come from another run and hold
+    the config of that run."""
 
     run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`
@@ -59,7 +60,7 @@ class Holder:
 class RunFolder:
     """Folder runs/<name>/ of one run."""
 
-    runs_dir: Path  # the folder of all runs
+    runs_dir: Path  # folder that holds all runs
     name: str  # name of the run, safe as a folder name
     source: str = ""  # origin of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
     changes: tuple[str, ...] = ()  # KEY=VALUE of each key in which the config differs from its source
@@ -67,7 +68,7 @@ class RunFolder:
     @classmethod
     def open_folder(cls, path: Path) -> "RunFolder":
         """Return the run in a folder, with its recorded source and changes."""
-        # Paths such as `.` do not show the name of the folder until they are resolved.
+        # A path such as `.` shows the folder's name only after it is resolved.
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()
         if record is None:
@@ -124,7 +125,7 @@ class RunFolder:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):
             return None
-        # Imported late: most folders lack this file and are not locked.
+        # Imported here, because most folders lack this file and are not locked.
         from filelock import FileLock, Timeout
 
         # A killed process leaves its file, but not its lock.
@@ -163,7 +164,7 @@ class RunFolder:
                     say(f"waiting: {message} (`--name NAME` chooses another folder)")
                 lock.acquire()
         try:
-            # Under the lock every temporary file belongs to a process that was killed.
+            # While this process holds the lock, every temporary file is left over from a process that was killed.
             remove_leftovers(self.path)
             worker = Holder(command_line(), os.getpid(), utc_now())
             with contextlib.suppress(OSError):  # only messages of other processes need this file
@@ -211,7 +212,7 @@ def config_of(folder: RunFolder) -> schema.Config | None:
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
-    """Return the readable results of these stages, and a message for each unreadable one, by stage."""
+    """Return the readable results of these stages, by stage, and a message for each unreadable one."""
     intact: dict[str, Stored] = {}
     bad: dict[str, str] = {}
     for stage in stages:
@@ -252,7 +253,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 
 
 def claim(folder: RunFolder, config: schema.Config) -> None:
-    """Record in a folder which config its results belong to. Call this under the lock, before any result is written.
+    """Record in a folder to which config its results belong. Call this under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config` does.
     """
@@ -264,7 +265,7 @@ def claim(folder: RunFolder, config: schema.Config) -> None:
 
 
 def refuse_another_config(folder: RunFolder, config: schema.Config) -> None:
-    """Raise ConfigError if a folder has results of another config, unless it is an earlier state of the same file.
+    """Raise ConfigError if a folder has results of another config, unless that is an earlier version of the same file.
 
     The name and the `sweep` block are not compared, since no result depends on them.
     """
@@ -290,12 +291,12 @@ def refuse_another_config(folder: RunFolder, config: schema.Config) -> None:
 
 
 def is_of_same_config_file(record: Record, folder: RunFolder) -> bool:
-    """Whether the results of a folder have the same config file and run name. The file may have been edited since."""
+    """Whether a record has the config file and the run name of a folder. The file may have been edited since."""
     return (record.run, record.source) == (folder.name, folder.source)
 
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
-"""Patterns of the files that drawing stages write. They are needed only if the index of the files is lost."""
+"""Patterns of the files that drawing stages write, for the case that the index of these files is lost."""
 CHUNKS = "sweep-chunks"
 FIGURES_FOLDER = "figures"
 UNFINISHED = (TEMPORARY, f"{FIGURES_FOLDER}/{TEMPORARY}", f"{CHUNKS}/{TEMPORARY}")
@@ -306,7 +307,8 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
-    """Return the existing files of a run: results of these stages, drawings, sweeps and leftovers of killed writers."""
+    """Return the files of a run that exist: results of these stages, drawings, sweeps, and leftovers of killed
+    writers."""
     files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, *UNFINISHED) for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
@@ -319,7 +321,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run that a result, drawing or record belongs to, or None for other files, which are the user's."""
+    """Return the run to which a result, drawing or record belongs, or None for any other file, which is the user's."""
     resolved = path.resolve()
     # Results are in the run's folder, and drawings in a folder below it.
     for place in (resolved.parent, resolved.parent.parent):

@@ -1,1 +1,2 @@
-"""Sweeps of one stage over many configs: the points, the engines that compute them, and their results."""
+"""Sweeps compute one stage for many configs. Here are their points, the engines that compute them, and their
+results."""

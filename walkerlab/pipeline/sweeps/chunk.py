@@ -29,7 +29,7 @@ Labels = Mapping[str, tuple[str, str]]
 
 OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of caches of stage inputs that a process keeps, see `input_cache`."""
+"""Maximum number of caches of stage inputs that a process keeps, see `input_cache`."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -58,7 +58,8 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def input_cache(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
-    """Return this process's cache of stage inputs, which outlives a chunk. Arguments are as in `compute_point`."""
+    """Return this process's cache of stage inputs, which lasts longer than a chunk. Arguments are as in
+    `compute_point`."""
     return MemoryResults(graph)
 
 
@@ -70,7 +71,8 @@ def compute_point(
     key       stage key of the point's result
     again     whether to repeat the walk of the point to measure the numerical error
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
-    expected  the caller's `versions` of extensions, which must be those of this process; None not to compare them
+    expected  versions of extensions in the calling process, which this process must have, too; None does not compare
+    them
     """
     memory = input_cache(graph, forced)
     try:
@@ -134,7 +136,7 @@ def is_regular(value: list[Any]) -> bool:
 
 
 def omit_outputs(config: Config, target: str, graph: Graph) -> Config:
-    """Return the config without time series of the target's walk, unless another stage needs them."""
+    """Return a config that stores no time series of the target's walk, unless another stage needs them."""
     asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads(config)]
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 
@@ -171,9 +173,9 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 def stored_chunks(
     runs_dir: Path, stage: str, code_digest: str, keys: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
-    """Iterate over a stage's results that the present code has computed and stored, in all run folders.
+    """Yield the stored results of a stage, in all run folders, that the present code has computed.
 
-    keys  stage keys of the sweep. Results of single runs are included only if their keys match, chunks always
+    keys  stage keys of the sweep. Chunks are always included, results of single runs only if their keys are among these
     warn  called with a message about each damaged chunk
     """
     for path in sorted(runs_dir.glob(f"*/{CHUNKS}/{stage}-{code_digest[:8]}-*.h5")):

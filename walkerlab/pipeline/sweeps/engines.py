@@ -27,7 +27,7 @@ LISTING_S: Final = 5.0
 RESULT_S: Final = 30.0
 """Time after a job's end in which its result may still appear on a network disk."""
 RESTART_S: Final = 20.0
-"""Time without a worker after which workers are started again. Dask itself needs some seconds to replace one."""
+"""Time without a worker after which workers are started again. Dask needs some seconds to replace one by itself."""
 SILENT_WORKER_S: Final = 600.0
 """If Slurm's queue has not answered for this time, its jobs count as lost."""
 GONE = "gone"
@@ -43,7 +43,7 @@ GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The 
 
 @dataclass(frozen=True)
 class EngineOptions:
-    """Options with which an engine opens its pool of workers."""
+    """Options for an engine's pool of workers."""
 
     workers: int = 0  # number of processes; 0 for the engine's default
     address: str = ""  # address of a running scheduler; empty to start one
@@ -56,13 +56,14 @@ class EngineOptions:
 class SweepEngine:
     """Engine that computes the chunks of a sweep."""
 
-    # opens a pool, whose `size` is the number of chunks that it computes at the same time, and closes it afterwards
+    # Opens a pool and closes it afterwards. Its `size` is the number of chunks that it computes at the same time.
     opened: Callable[[EngineOptions], contextlib.AbstractContextManager[SizedExecutor]]
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
     def start_early(self, options: EngineOptions) -> Iterator["SweepEngine"]:
-        """Yield the engine for one sweep. Local workers start now and import modules while the points are prepared."""
+        """Yield the engine for one sweep. Local workers start at once, and import modules while the points are
+        prepared."""
         if self.opened is not local:
             yield self
             return
@@ -98,7 +99,7 @@ def environment_of_workers() -> Iterator[None]:
 def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
-    # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
+    # Dask copies these variables into the environment of this process whenever it starts or replaces a worker.
     with environment_of_workers(), contextlib.ExitStack() as stack:
         workers: DaskWorkers | None = None
         if options.address:
@@ -117,7 +118,7 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
         # Dask's own executor reports an error if a worker dies before it hands over a result. Here such a chunk is
         # computed again, as in every engine.
         size = options.workers or max(1, len(client.nthreads()))
-        # By default Dask gives equal calls the same result, so a second attempt would get that of the first.
+        # By default, Dask gives equal calls the same result, so a second attempt would get the error of the first.
         executor = JobExecutor(
             functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
         )
@@ -147,7 +148,7 @@ class DaskWorkers:
                     self._seen_at = time.monotonic()
                 elif time.monotonic() - self._seen_at > RESTART_S:
                     self.cluster.scale(0)
-                    time.sleep(1.0)  # the cluster forgets closed workers in the background
+                    time.sleep(1.0)  # meanwhile the cluster forgets its closed workers
                     self.cluster.scale(self.count)
                     self._seen_at = time.monotonic()
 
@@ -157,7 +158,7 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", options)
-    # Options are texts, but submitit refuses numbers that are texts.
+    # Options come as texts, but submitit refuses numbers in the form of text.
     parameters: dict[str, Any] = {name: number_or_text(text) for name, text in options.options.items()}
     cluster = str(parameters.pop("cluster", "slurm"))
     python = parameters.pop("python", None)
@@ -200,25 +201,26 @@ def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
     try:
         return fn(*args)
     finally:
-        for number in numbers:  # nothing must keep the result from being stored
+        for number in numbers:  # a second signal must not prevent that the result is stored
             signal.signal(number, signal.SIG_IGN)
 
 
 class SlurmQueue:
-    """States of this user's Slurm jobs, from the queue. submitit asks only the accounting, which few clusters keep."""
+    """States of this user's Slurm jobs, read from the queue. submitit only asks for the accounting, which few clusters
+    keep."""
 
     def __init__(self, time_limit: str) -> None:
-        """Remember the time limit of the jobs (min). Slurm is first queried when a state is needed."""
+        """Store the time limit of the jobs (min). Slurm is not queried before a state is needed."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
-        # The time is shifted so that the first call of `state` queries Slurm without waiting.
+        # The last query seems long ago, so that the first call of `state` queries Slurm without waiting.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:
         """Wait until a job has stored its result.
 
-        Raises JobEndedError if it ended without one.
+        Raises JobEndedError if the job ended without a result.
         """
         submitted = seen_alive = time.monotonic()
         while not job.paths.result_pickle.exists():
@@ -231,16 +233,16 @@ class SlurmQueue:
             time.sleep(1.0)
 
     def state(self, job_id: str, submitted: float) -> str:
-        """Return the state of a job that was submitted at a time of the monotonic clock.
+        """Return the state of a job that was submitted at time `submitted` of the monotonic clock.
 
-        GONE if the queue no longer lists the job, SILENT if Slurm has not answered for long, UNKNOWN before the first
-        list that may hold it.
+        GONE means that the queue no longer lists the job, SILENT that Slurm has not answered for long, and UNKNOWN that
+        there is no list yet that may hold the job.
         """
         with self._lock:
             now = time.monotonic()
             if now - self._listed_at >= LISTING_S:
                 self._listed_at = now
-                # finished jobs stay in the list for some minutes
+                # `all`, because the list then has finished jobs, too, for some minutes
                 command = ["squeue", "--noheader", "--me", "--states=all", "--format=%i %T"]
                 done = subprocess.run(command, capture_output=True, text=True, check=False)
                 if done.returncode == 0:
@@ -261,9 +263,9 @@ class SlurmQueue:
 
 
 def private_jobs_folder(run_folder: Path) -> Path:
-    """Create a folder for pickled jobs and results that only this user can open, or close an existing one to others.
+    """Create a folder for pickled jobs and results that only this user can open. Close an existing folder to others.
 
-    Loading a pickle runs its code.
+    This matters because loading a pickle runs the code in it.
 
     Raises ConfigError if other users may replace it, StorageError if it cannot be created or closed.
     """
@@ -283,7 +285,7 @@ def private_jobs_folder(run_folder: Path) -> Path:
 
 
 class JobExecutor(SizedExecutor):
-    """Executor that starts jobs of a library. A thread waits for each job."""
+    """Executor that starts jobs through a library, and waits for each job in a thread."""
 
     def __init__(self, start: Callable[..., Any], size: int, wait_for: Callable[[Any], None] | None = None) -> None:
         """Store the functions that start a job and wait for it.
@@ -306,7 +308,7 @@ class JobExecutor(SizedExecutor):
                 if self._wait_for is not None:
                     self._wait_for(job)
                 result = job.result()
-            except BaseException as error:  # a cancelled job may raise an error that is no Exception
+            except BaseException as error:  # the error of a cancelled job need not be an Exception
                 future.set_exception(error)
             else:
                 future.set_result(result)
@@ -323,7 +325,7 @@ def refuse_address(name: str, options: EngineOptions) -> None:
 
 
 def extra(module: str, name: str) -> Any:
-    """Import a library that an extra of the package installs.
+    """Import a library that is installed only with an extra of the package.
 
     Raises ConfigError if it is not installed.
     """
@@ -350,7 +352,7 @@ def parse_engine(text: str) -> tuple[SweepEngine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: unknown engine; choose from {', '.join(ENGINES)}.")
-    # multiprocessing marks the processes that it starts in this way. They first run the calling script.
+    # This mark shows that multiprocessing has started this process, which runs the calling script again.
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep again.", GUARD

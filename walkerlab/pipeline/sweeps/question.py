@@ -1,4 +1,4 @@
-"""Points of a sweep: a stage, parameters with their values, and the way to combine them."""
+"""Points of a sweep: a stage, parameters with their values, and how these are combined."""
 
 import math
 import re
@@ -30,9 +30,9 @@ class Axis:
     """Parameter of a sweep, with its values."""
 
     key: str  # dotted config key
-    values: tuple[Value, ...]  # values in order; for a list of points, one per point
+    values: tuple[Value, ...]  # values in order; if the layout is `list`, one per point
     source: str  # origin of the values, for messages
-    ends: tuple[float, float] | None = None  # bounds of the range, for sampling; None for a list of values
+    ends: tuple[float, float] | None = None  # ends of the interval to sample; None for a list of values
 
     def setting(self, index: int) -> files.ConfigSetting:
         """Return one value as a `--set` option."""
@@ -43,9 +43,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class SweptStage:
-    """Stage with the parameter values at which a sweep computes it.
+    """Stage, and the parameter values at which a sweep computes it.
 
-    names   names of the parameters in results: the last part of each key, or more parts if last parts coincide
+    names   names of the parameters in results: the last part of each key, or more parts if two keys have the same last
+    part
     """
 
     stage: str
@@ -87,7 +88,7 @@ class SweptStage:
 
 
 def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
-    """Return the shortest suffix of each dotted key that distinguishes it from the others."""
+    """Return the shortest ending of each dotted key that distinguishes it from the others."""
     shortest = []
     for key in keys:
         parts = key.split(".")
@@ -102,7 +103,7 @@ def build_sweep(
 ) -> SweptStage:
     """Build a sweep from command-line options or a `sweep` block.
 
-    over    key of each parameter, its values (a list, or FROM:TO:N) and their origin
+    over    for each parameter its key, its values (a list, or FROM:TO:N) and where these come from
     zipped  whether the n-th values form the n-th point, instead of the full grid
     sample  such as latin-hypercube:500; empty to use the values themselves
 
@@ -111,7 +112,7 @@ def build_sweep(
     axes: tuple[Axis, ...] = ()
     for key, values, source in over:
         axes = (*axes, axis(key, values, source))
-        if not (zipped or sample):  # checked before the next parameter's values are created
+        if not (zipped or sample):  # checked here, before the values of the next parameter take more memory
             refuse_too_many("sweep", math.prod(max(1, len(parameter.values)) for parameter in axes))
     keys = [parameter.key for parameter in axes]
     repeated = {key for key in keys if keys.count(key) > 1}
@@ -153,7 +154,8 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 
 def parameter_error(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """Build the error for an invalid parameter, option or key. Its message gives `source`, not a file position."""
+    """Build the error for an invalid parameter, option or key. The message names `source` instead of a position in a
+    file."""
     return problems.problem_error(tree.Position(source, 0, 0), text, allowed, near)
 
 
@@ -172,7 +174,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
             raise parameter_error(source, f"{key}: is a block of keys, not a value")
-        if not key.startswith("walker."):  # walkers of other types have other keys, which are checked at each point
+        if not key.startswith("walker."):  # points may have other types of walkers, so each is checked
             raise parameter_error(source, f"{key}: unknown key", near=problems.nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
@@ -196,7 +198,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def convert_for_key(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to int if the key takes integers. Other numbers are kept, and the schema rejects them."""
+    """Convert whole numbers to int if the key takes integers. Other numbers are left for the schema to reject."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -204,7 +206,7 @@ def convert_for_key(key: str, values: Sequence[float]) -> tuple[Value, ...]:
 
 
 def evenly_spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
-    """Return `count` values from `low` to `high`, both included. A single value is `low`."""
+    """Return `count` values from `low` to `high`, both included, or only `low` if `count` is 1."""
     import numpy as np
 
     space = np.geomspace if logarithmic else np.linspace
@@ -255,10 +257,10 @@ def values_at(axis: Axis, column: Any) -> Iterator[Value]:
 
 
 def described(config: schema.Config, key: str) -> tuple[str, str]:
-    """Return the unit of a key under a config (units may depend on it), and the meaning of the key."""
+    """Return unit and meaning of a key. The unit may depend on the config."""
     *above, last = key.split(".")
     block = value_at(config, above)
-    # The block may be of another type than the schema's default, and so have other keys.
+    # The block may be of another type than the schema's default, and then has other keys.
     field = key_fields().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key

@@ -1,4 +1,5 @@
-"""Content of a sweep's file: parameters as coordinates, the stage's quantities as variables over them."""
+"""Build the content of a sweep's file, with parameters as coordinates and the stage's quantities as variables over
+them."""
 
 import json
 import sys
@@ -30,11 +31,11 @@ STATUS_TEXTS: Final = {
 """Columns that every point has in addition to the stage's quantities."""
 STATE_NAMES: Final = ("state", "start_state", "final_state")
 MAX_REASON: Final = 500
-"""Maximum length of a reason. Text in files has a fixed length, so one long reason makes room for it at all points."""
+"""Maximum length of a reason. Text in files has a fixed length, so a long reason would take its room at every point."""
 
 
 class SweepVariable:
-    """Column of sweep results: a number, a list of numbers or a string for each of `size` results."""
+    """Column of results: a number, a list of numbers or a string for each of `size` results of a sweep."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
         """Start with missing values only. `shape` is the shape of one value."""
@@ -43,7 +44,7 @@ class SweepVariable:
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
 
     def put(self, places: Integers, values: Sequence[Any]) -> None:
-        """Store values at these indices. The column grows if a value has a larger shape."""
+        """Store values at the indices `places`. The column grows if a value has a larger shape."""
         if self.text:
             # Equal strings share one object to save memory.
             self.values[places] = [sys.intern(value) for value in values]
@@ -55,8 +56,8 @@ class SweepVariable:
                 self.put(places[k : k + 1], [value])
             return
         if array.ndim != self.values.ndim:
-            return  # a list where other points have a number cannot be stored
-        # NumPy makes integers of a list that mixes switches and counts, so the types are read from the list itself.
+            return  # lists cannot be stored in a column of numbers, nor numbers in one of lists
+        # NumPy turns a list that mixes bools and integers into integers, so the types are read from the list.
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
         shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
         if shape != self.values.shape[1:]:
@@ -67,7 +68,7 @@ class SweepVariable:
         self.values[own] = array
 
     def typed(self) -> NDArray[Any]:
-        """Return the values in their type, or as floats with NaN if some are missing."""
+        """Return the values in their own type, or as floats with NaN if some are missing."""
         if self.text or np.isnan(self.values).any():
             return self.values
         if self.kinds == {np.bool_}:
@@ -86,7 +87,7 @@ class Merge:
     """Merges the rows of a sweep's results into one column per quantity.
 
     config   base config of the sweep
-    inverse  index of the result of each point
+    inverse  for each point, the index of its result
     """
 
     def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
@@ -134,7 +135,7 @@ class Merge:
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> artifact.InTurn:
-        """Return the content to store. Call this only once, because storing the content removes the columns."""
+        """Return the content to store. Call this only once, because it removes the columns."""
         question = self.question
         parameters = dict(coordinates(question, self.config))
         statuses = self.columns["status"].values[self.inverse]
@@ -153,13 +154,13 @@ class Merge:
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: column for name, column in parameters.items() if column.dims == (name,)}
         size = sum(hdf5.stored_bytes(column.values) for column in self.columns.values())
-        # A quantity that is also a parameter is stored as the coordinate of that parameter.
+        # A quantity that is also a parameter is stored only as the coordinate of that parameter.
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
         return artifact.InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe how walks ended and the role of the ground, or return nothing for a stage that simulates no walk."""
+        """Describe how walks ended, and whether the ground is why. Return [] for a stage that simulates no walk."""
         question = self.question
         config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
@@ -176,7 +177,8 @@ class Merge:
         return describe_endings(count_texts(outcomes), config, question.stage == CONTACT_STAGE, pads)
 
     def numerical_error(self) -> dict[str, Any]:
-        """Return the largest errors of the repeated walks. `ended_otherwise` counts those that ended differently."""
+        """Return the largest errors of the repeated walks, and under `ended_otherwise`, how many of them ended
+        differently."""
         errors = {key: self.values_of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
         reasons = self.values_of("numerical_error.reason")
         ends = errors["end_time_s"]
@@ -237,7 +239,8 @@ def count_texts(texts: NDArray[Any]) -> dict[str, int]:
 
 
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
-    """Format a CSV table of the points: parameters, outcome and headline quantities, or with `every` all values."""
+    """Format a CSV table of the points: parameters, outcome and headline quantities or, if `every` is true, all
+    values."""
     group = content[""]
     dimensions = len(question.shape)
     columns: dict[str, list[Any]] = {}
@@ -255,7 +258,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
-    """Split a variable into columns, one for each entry of a list. Gaps are empty."""
+    """Split a variable into columns, one for each entry of a list. Missing values are ''."""
     values = variable.values
     points = values.shape[:dimensions]
     inner_shape = values.shape[dimensions:]

@@ -39,7 +39,8 @@ class SweepWork:
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
-    # Called with the names of all quantities so far, after each chunk with an answer. It may raise an error.
+    # Called after each chunk with an answer, with the names of all quantities so far. It raises an error to stop the
+    # sweep.
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
@@ -60,7 +61,7 @@ class Swept:
 
     @property
     def group(self) -> Group:
-        """Variables over the points. Each is read from the file on access."""
+        """Variables over the points, each read from the file on access."""
         return hdf5.GroupOnDisk(self.path)
 
     @property
@@ -89,8 +90,8 @@ class Foreseen:
     path: Path
     points: tuple[str, ...]  # descriptions of the first points
     count: int  # number of points
-    there: int  # number of points with a stored result
-    estimate_s: float | None  # expected time for the other points, s; None if no stored point was timed
+    there: int  # number of points whose result is already stored
+    estimate_s: float | None  # expected time for the other points, s; None if no stored point has a run time
 
 
 class SweepRun:
@@ -112,9 +113,9 @@ class SweepRun:
         unique, self.inverse = np.unique(keys, return_inverse=True)
         # NumPy drops zero bytes at the end of a byte string.
         self.places = {key.ljust(32, b"\0").hex(): index for index, key in enumerate(unique.tolist())}
-        # By key: index of the first point that has it.
+        # For each distinct key, the index of the first point that has it.
         self.first = np.full(len(unique), len(keys))
-        # `minimum.at` also counts repeated indices, unlike an assignment to them.
+        # Unlike an assignment, `minimum.at` counts every one of several equal indices.
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
         over = {axis.key: list(axis.values) for axis in question.axes}
         base = loaded.config.model_dump(mode="json", exclude={"sweep"})
@@ -123,11 +124,11 @@ class SweepRun:
         self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
 
     def config(self, index: int) -> schema.Config:
-        """Build the config of one point, on demand because a sweep may have a million points."""
+        """Build the config of one point. It is not kept, because a sweep may have a million points."""
         return self.loaded.variant(self.question.settings(index))
 
     def foresee(self, workers: int, max_points: int) -> Foreseen:
-        """Return the plan without changing a file.
+        """Return what the sweep would do. This changes no file.
 
         Raises ConfigError if the folder holds results of another config.
         """
@@ -192,7 +193,7 @@ class SweepRun:
     def _compute(
         self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, origin: provenance.Provenance
     ) -> tuple[str, ...]:
-        """Compute the missing points, and return the tracebacks of bugs, one for each place in the code."""
+        """Compute the missing points, and return the tracebacks of bugs, but only one for each line of code."""
         missing = np.sort(self.first[~merge.has_row])
         if not missing.size:
             return ()
@@ -207,7 +208,7 @@ class SweepRun:
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
-                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
+                place = bug.rpartition("\n  ")[0]  # the message is left out, because it differs from point to point
                 if place not in bugs:
                     reporter.warn(f"a bug stopped one point of the sweep; the others continue.\n{bug}")
                     bugs[place] = bug
@@ -225,10 +226,11 @@ class SweepRun:
         return tuple(bugs.values())
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
-        """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
+        """Yield the points to compute. The walks of a sample of them are repeated to measure the numerical error."""
         stage = self.question.stage
         graph = self.keys.graph
-        # Workers keep inputs between chunks. With a new token, a forced sweep does not reuse those of earlier sweeps.
+        # Workers keep inputs between chunks. Because of the new token, a forced sweep does not reuse those of earlier
+        # sweeps.
         forced = token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
@@ -242,7 +244,7 @@ class SweepRun:
 def checked_keys(run: SweepRun) -> list[bytes]:
     """Return the stage key of every point (32 bytes each), in order.
 
-    Raises ConfigError that names invalid points with their values, one point for each reason.
+    Raises a ConfigError that names, for each reason, one invalid point with its values.
     """
     question = run.question
     keys: list[bytes] = []
@@ -262,7 +264,7 @@ def checked_keys(run: SweepRun) -> list[bytes]:
 
 
 def unread_keys(run: SweepRun) -> Iterator[str]:
-    """Iterate over swept parameters that neither the stage nor its inputs read."""
+    """Yield the swept parameters that neither the stage nor its inputs read."""
     question = run.question
     base = run.keys.compute_keys(run.config(0), question.stage)
     for number, axis in enumerate(question.axes):

@@ -1,4 +1,4 @@
-"""Messages and progress on stderr: bars on a terminal, otherwise occasional lines."""
+"""Show messages and progress on stderr, with bars on a terminal and otherwise with a line now and then."""
 
 import bisect
 import contextlib
@@ -19,7 +19,8 @@ MAX_SILENCE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
 MIN_DONE_FRACTION = 0.1
-"""Minimum fraction of done parts for a prediction of the remaining time, because the first parts are not typical."""
+"""Minimum fraction of completed parts for a prediction of the remaining time, because the first parts are not
+typical."""
 MIN_COMPUTED_S = 3.0
 """Minimum computing time (s) for a prediction of the remaining time."""
 
@@ -79,7 +80,7 @@ class Console:
 
     def show(self, page: Path | str) -> bool:
         """Open a file or address in a browser, and return whether a browser was found."""
-        # Imported here: most commands show no page.
+        # Imported here, because most commands show no page.
         import webbrowser
 
         place = page if isinstance(page, str) else page.resolve()
@@ -125,7 +126,7 @@ class Console:
     def _show_bars(self) -> None:
         if self._live is not None:
             return
-        # Imported here: only progress bars need rich.
+        # Imported here, because only progress bars need rich.
         from rich.console import Console as Terminal
         from rich.live import Live
 
@@ -155,7 +156,7 @@ class StageLine:
         self.label = stage
         self.total: int | None = None
         self.done = 0
-        self.progress: list[tuple[int, float]] = []  # parts done and computing time (s), after each advance
+        self.progress: list[tuple[int, float]] = []  # completed parts and computing time (s), after each advance
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Exports for use in other programs: figures, tables and trajectories as files, and walks as GIF or MP4."""
+"""Export figures, tables and trajectories as files for other programs, and walks as GIF or MP4."""
 
 import io
 import re
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """Destination and size of an export."""
+    """File, format and size of an export."""
 
     to: str | None  # format, or file name if `output` is None
     output: Path | None  # file; None derives its name from the run
@@ -48,7 +48,7 @@ class Target:
         """Return the file to write and its format, by default the first of `kinds`.
 
         what  the exported item, for messages
-        stem  name of the file without its ending, if the user gave none
+        stem  name of the file, without its ending, if the user named no file
         Raises ConfigError for an unknown format, or if the file must not be overwritten.
         """
         a_file = self.to is not None and self.output is None and "." in self.to
@@ -100,7 +100,7 @@ NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY = "trajectory"
 STEPS = "steps"
 OUTPUTS_ADVICE = "Run it with outputs: [states, energies, forces]."
-"""Advice for a walk that was stored without a trajectory."""
+"""Advice if a walk was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
@@ -143,7 +143,7 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
 
     Raises ConfigError for an invalid config or unknown format.
     """
-    # Imported here: no other export draws a walker.
+    # Imported here, because no other export draws a walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
     from walkerlab.views.figures.measures import draw_measures
@@ -162,13 +162,13 @@ def hyphenate(words: str) -> str:
 
 
 def caption_name(caption: str) -> str:
-    """Make a file name from a caption's first words, up to a comma or colon."""
+    """Turn the words of a caption before the first comma or colon into a file name."""
     return hyphenate(re.split("[,:]", caption)[0])
 
 
 def page_tables(folder: runs.RunFolder) -> dict[str, Table]:
-    """Return the tables of a run's page by short caption, or by full caption where the short one is ambiguous."""
-    # Imported here: exporting a figure needs no page.
+    """Return the tables of a run's page by short caption or, if two tables share that, by full caption."""
+    # Imported here, because exporting a figure needs no page.
     from walkerlab.views.report.blocks import Results
     from walkerlab.views.report.registry import pages_of
 
@@ -190,7 +190,7 @@ def find_item(folder: runs.RunFolder, name: str) -> "Illustration | Table":
 
     Raises ConfigError for an unknown name. Its advice lists the items of the run.
     """
-    # Imported here: tables of the paper's values need no drawing code.
+    # Imported here, because tables of the paper's values need no drawing code.
     from walkerlab.views.figures.stage import FIGURES
 
     figures = {illustration.name: illustration for illustration in FIGURES}
@@ -208,7 +208,7 @@ def find_item(folder: runs.RunFolder, name: str) -> "Illustration | Table":
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, graph.PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
-    # The figure with the most similar number is not what a user meant.
+    # A user who asks for a figure that does not exist did not mean the one with the most similar number.
     near = "" if name.startswith("figure-") else problems.suggestion(name, names)
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
@@ -304,7 +304,7 @@ def trajectory(folder: runs.RunFolder, model: str, kind: str, console: Console) 
     if group is None:
         raise StaleError("the walk was stored without a trajectory.", OUTPUTS_ADVICE)
     if kind == "nc":
-        # Imported here: CSV needs no HDF5.
+        # Imported here, because CSV needs no HDF5.
         from walkerlab.pipeline.store import hdf5
 
         attributes = {
@@ -334,7 +334,7 @@ class Film:
 
 
 BOTH = "both"
-"""Value of `Film.model` that shows both models in one picture."""
+"""Value of `Film.model` for both models in one picture."""
 MAX_GIF_RATE = 50
 """Maximum frame rate (frames per second). Browsers show a frame shorter than 20 ms for 100 ms."""
 
@@ -365,7 +365,7 @@ def write_film(folder: runs.RunFolder, target: Target, film: Film, console: Cons
     if kind == "gif" and film.rate > MAX_GIF_RATE:
         message = f"browsers slow down GIFs with more than {MAX_GIF_RATE} frames per second."
         raise ConfigError(message, "Lower --rate, or use .mp4.")
-    # Imported here: if the file cannot be written, the user should not have to wait for the drawing code.
+    # Imported here, so that a user whose file cannot be written need not wait for the drawing code.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
     rigid, contact = MODEL_NAMES
@@ -397,8 +397,8 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]
-    # A GIF counts hundredths of a second. The frames' ends are rounded, because rounded durations would add up to an
-    # error of the whole film.
+    # A GIF counts hundredths of a second. The times at which frames end are rounded, because the errors of rounded
+    # durations would add up over the film.
     durations_ms = 10 * np.diff(np.round(100 * np.arange(len(frames) + 1) / rate)).astype(int)
     file = io.BytesIO()
     frames[0].save(file, format="GIF", save_all=True, append_images=frames[1:], duration=durations_ms.tolist(), loop=0)
@@ -413,8 +413,8 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
-    # Many players show only yuv420p. The fragments are needed because ffmpeg writes to a pipe, in which it cannot go
-    # back to write the index of an ordinary MP4.
+    # Many players show only yuv420p. The MP4 is fragmented, because ffmpeg cannot go back in a pipe to write the index
+    # of an ordinary MP4.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

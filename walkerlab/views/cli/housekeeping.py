@@ -1,4 +1,4 @@
-"""Commands on stored results, configs and extensions: status, show, diff, schema, extensions, clean."""
+"""Commands about stored results, configs and extensions: status, show, diff, schema, extensions, clean."""
 
 import contextlib
 import re
@@ -98,9 +98,9 @@ SAME_CHANGE = 1e-12
 DIGITS = 6
 """Significant digits of a headline value."""
 IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
-"""Words in the names of error measures, whose relative change means nothing."""
+"""Words that mark the names of error measures. A relative change of an error means nothing."""
 ROUNDING_SI = 1e-9
-"""Magnitude (SI units) below which values are at the level of rounding or of the solver's tolerance."""
+"""Magnitude (SI units) below which a value may be nothing but rounding or the error of the solver."""
 
 
 def diff(
@@ -135,7 +135,8 @@ def run_labels(folders: "tuple[RunFolder, RunFolder]") -> tuple[str, str]:
 
 
 def draw_both(folders: "tuple[RunFolder, RunFolder]", results: list[dict[str, Any]]) -> list[Path]:
-    """Draw both runs' walks overlaid, store the images in the first run's figures folder, and return their paths."""
+    """Draw the walks of both runs overlaid, store the images in the figures folder of the first, and return their
+    paths."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import draw_runs
 
@@ -166,7 +167,7 @@ def comparison_object(
 def comparison_lines(
     folders: "tuple[RunFolder, RunFolder]", comparison: "RunDifference", figures: list[Path], every: bool
 ) -> list[str]:
-    """Describe changed config keys, and the headline values of changed stages or, with `every`, all changed values."""
+    """Describe changed config keys, and changed values of the stages: headline values or, if `every` is true, all."""
     from walkerlab.views.report.numbers import number
     from walkerlab.views.report.tables import aligned, format_value
 

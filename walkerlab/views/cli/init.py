@@ -30,8 +30,8 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
-    """Write a walker's commented config and the schema. With `checks`, the config is short and has a printed gait to
-    fill in.
+    """Write a walker's commented config and the schema. If `checks` is true, the config is short and has a printed gait
+    to fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """
@@ -64,7 +64,7 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
 def template(walker: str) -> str:
     types: dict[str, str] = {}
     for name in (files.DEFAULT, *files.builtin_names()):
-        # Several built-in configs have walkers of one type. The first is its template.
+        # Several built-in configs have walkers of the same type. The first of them is the template of the type.
         types.setdefault(loader.load(Path(name)).config.walker.type, name)
     choices = types | {name: name for name in files.builtin_names()}
     if walker not in choices:

@@ -22,20 +22,21 @@ from walkerlab.views.cli.request import OUTPUT_FIELDS, RUN_OPTIONS, Offer, Reque
 
 def main() -> None:
     """Run the program with this process's arguments, and exit with its code."""
-    # Loaded modules stay until the command ends. Searching them for garbage repeatedly would take longer than finding a
-    # gait with compiled code.
+    # Loaded modules stay until the command ends. It would take longer to search them for garbage again and again than
+    # to find a gait with compiled code.
     gc.set_threshold(300_000, 50, 100)
-    # All matrices are small. Threads that share one would spend more time waiting than computing.
+    # All matrices are small, so threads that share one would spend more time waiting than computing.
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    # Python collects garbage once more when it ends. Frozen objects are left out, so this takes no time.
+    # Python collects garbage once more when it ends. This takes no time if all objects are frozen.
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
     def format_warning(
         message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None
     ) -> str:
-        # Imported here, because help must not load the compiler. A cache warning appears only after that is loaded.
+        # Imported here, because help must not load the compiler. No cache warning can appear before the compiler is
+        # loaded.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning
@@ -47,9 +48,10 @@ def main() -> None:
 
 
 def tolerate_output_errors() -> None:
-    """Discard output to closed streams, and escape characters that cannot be encoded, as in undecodable file names."""
+    """Discard output to closed streams, and escape characters that cannot be encoded, such as those of odd file
+    names."""
     for name in ("stdout", "stderr"):
-        # Python has no such object if the stream was closed when it started.
+        # Python sets the stream to None if it was closed when Python started.
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
         getattr(sys, name).reconfigure(errors="backslashreplace")
@@ -65,7 +67,7 @@ GROUPS = {
     ),
     "Keep house": ("status", "show", "schema", "extensions", "rerun", "compile", "clean"),
 }  # fmt: skip
-"""Commands by purpose, in the order of the help. Commands that are in no group are listed in the last one."""
+"""Commands by purpose, in the order of the help, which lists commands without a group in the last one."""
 
 
 class Commands(TyperGroup):
@@ -112,7 +114,7 @@ def options_of_the_program(
         bool, typer.Option("--verbose", "-v", help="With --version: also print where compiled code comes from.")
     ] = False,
 ) -> None:
-    """Print the version, or leave the rest to a command."""
+    """Print the version if `--version` is given. Otherwise do nothing, as a command follows."""
     if version:
         print_version(verbose)
     elif context.invoked_subcommand is None:
@@ -121,7 +123,7 @@ def options_of_the_program(
 
 def print_version(verbose: bool) -> None:
     """Print the version, with the code's commit if it is known, and exit."""
-    # Imported here: only this option needs git, and only its long form the compiler.
+    # Imported here, because only this option needs git, and only its long form needs the compiler.
     from walkerlab.pipeline.store.commit import commit_of_package
 
     commit = commit_of_package(Path(walkerlab.__file__).parent)
@@ -143,7 +145,7 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     own = [option for option in stage.options if option is not STRIDES]
 
     def run(request: Request) -> None:
-        # Imported here: help must load neither the config nor NumPy.
+        # Imported here, because help must load neither the config nor NumPy.
         from walkerlab.views.cli.stage import run_stage
 
         run_stage(request, graph[request.instead or stage.name])

@@ -1,4 +1,4 @@
-"""`walkerlab export RUN model`: a run's walker with the start of its gait, for ADAMS and MuJoCo."""
+"""`walkerlab export RUN model`: write a run's walker, at the start of its gait, as a model for ADAMS or MuJoCo."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +33,7 @@ def write_model(
     for warning in resolved.loaded.warnings:
         console.warn(warning)
     warn_of_edits(config, folder, console.warn)
-    # MuJoCo's viewer opens files that end in .xml.
+    # MuJoCo's viewer opens only files that end in .xml.
     named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
     to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
     path, ending = replace(target, to=to).choose_file("a model", folder.name, list(ENDINGS))

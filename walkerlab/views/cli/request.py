@@ -1,4 +1,4 @@
-"""Commands of the program: the options they share, how they print results and failures, and how typer gets them."""
+"""Declare the options that commands share, print results and failures, and build typer's commands."""
 
 import contextlib
 import errno
@@ -27,7 +27,7 @@ from walkerlab.pipeline.plan.stage import Option
 from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.console import Console
 
-# Imported for types only: help must load neither the config nor NumPy.
+# Imported only for types, because help must load neither the config nor NumPy.
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
@@ -42,7 +42,7 @@ BLOCK_KIND = re.compile(r"\([^)]*\)")
 
 def keys_to_set(incomplete: str) -> list[str]:
     """Return the config keys that complete a word, each with the `=` that `--set` needs."""
-    # Imported here and below: only shell completion needs the lists.
+    # Imported here, because only shell completion needs the list.
     from walkerlab.config.reference import keys
 
     of_kinds = (BLOCK_KIND.sub("", row.key) for row in keys() if row.key != "extends")
@@ -92,7 +92,7 @@ class Request:
     """Options shared by commands. Options that a command does not offer keep their defaults."""
 
     command: str  # name of the command as typed
-    own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
+    own: tuple[SetByOption, ...] = ()  # settings made from options that only this command has
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     graph: Graph = PIPELINE  # the stages of the program
     full: bool = switch("--full", help="Also run the long campaign. An interrupted one resumes the next time.")
@@ -177,7 +177,7 @@ class Request:
 
     @property
     def run_dir(self) -> Path | None:
-        """The run's folder, or None if the run has not been resolved."""
+        """Folder of the run, or None if it is not resolved yet."""
         return self.folder.path if "resolved_run" in vars(self) else None
 
     @property
@@ -196,7 +196,7 @@ class Request:
 RUN_OPTIONS = ("config", "sets", "strides", "name", "runs")
 """Options that select the run."""
 OUTPUT_FIELDS = ("as_json", "quiet", "verbose")
-"""Options for the form and amount of output."""
+"""Options for the form and the amount of output."""
 
 
 FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -206,7 +206,7 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def exit_on_failure(request: Request) -> Iterator[None]:
     """Turn expected failures into a message on stderr and an exit code. With `--json`, also print a JSON object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
-    # Background jobs of a script ignore SIGINT, and must continue to ignore it.
+    # A background job of a script ignores SIGINT, and must go on doing so.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
@@ -221,7 +221,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
 
     try:
         yield
-        # Otherwise an error of the output would appear at exit, as a traceback.
+        # Otherwise an error of the output would appear at exit, with a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
         raise fail(error) from None
@@ -269,7 +269,7 @@ def as_json(error: WalkerlabError, request: Request) -> dict[str, Any]:
 
 
 def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:
-    # A user who stops a command knows that this is no error.
+    # A user who stops a command knows that nothing went wrong.
     lead = "" if isinstance(error, StoppedError) else "error: "
     print(f"{lead}{error.message}", file=sys.stderr)
     if error.advice:
@@ -295,7 +295,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
     settings = []
     for option in options:
         value = values[option.flag]
-        # 0 is a value, unlike an empty list.
+        # Unlike an empty list, 0 is a value.
         if option.runs or (not value and value != 0):
             continue
         if any(values[flag] is None for flag in option.needs):
@@ -329,8 +329,8 @@ def bounds(option: "Option", values: Sequence[str]) -> str:
 
 
 def pairs(option: "Option", values: Sequence[str]) -> str:
-    """Convert NAME=VALUE,... arguments to YAML. A bare unit applies to all quantities of its kind."""
-    # Imported here: few commands read files of other programs.
+    """Convert NAME=VALUE,... arguments to YAML. A unit without NAME applies to all quantities of its kind."""
+    # Imported here, because few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
 
@@ -360,7 +360,7 @@ class SuggestingCommand(TyperCommand):
         """Parse the options. If an unknown option is a config key, the error message suggests `--set`."""
         try:
             return super().parse_args(ctx, args)
-        except Exception as error:  # click's NoSuchOption; its module depends on typer's version
+        except Exception as error:  # NoSuchOption of click, whose module depends on the version of typer
             typed = str(getattr(error, "option_name", ""))
             name = typed.lstrip("-").replace("-", "_")
             keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
@@ -376,7 +376,7 @@ class Offer(NamedTuple):
     """A function that the program offers as a command. Its arguments are a request and further options."""
 
     function: Callable[..., None]
-    shared: Sequence[str] = ()  # fields of the request that the command offers as options
+    shared: Sequence[str] = ()  # fields of the request that are options of the command
     name: str | None = None  # name of the command; default: the function's
     asks: type[Request] = Request  # type of the request; its additional fields come first in the help
     purpose: str | None = None  # help text; default: the function's docstring
@@ -387,7 +387,7 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
     """Add a command to the program of a graph. Errors of its function end it as `exit_on_failure` describes."""
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
-    # Flags such as --from cannot be names of parameters.
+    # A flag such as --from cannot be the name of a parameter.
     names = {f"set_{index}": option for index, option in enumerate(sets)}
 
     def run(**arguments: Any) -> None:

@@ -1,4 +1,4 @@
-"""A stage's command: run the stage or show what would be computed, then print the result."""
+"""The command of a stage: run the stage and print the result, or show what would be computed."""
 
 import shlex
 
@@ -27,7 +27,8 @@ def run_stage(request: Request, stage: Stage) -> None:
 
 
 def report_on(request: Request, stage: Stage) -> None:
-    """Run a stage as requested and print its result. Its ConfigErrors lack the position in the config file."""
+    """Run a stage as requested and print its result. A ConfigError that it raises lacks the position in the config
+    file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     reporter = None if options.dry else request.console
     report = run_and_write(request.resolved_run, stage.name, options, reporter, request.graph)
@@ -63,10 +64,10 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         answers = answer(report.stage, own | ({"figures": drawn} if drawn else {}))
         if request.verbose:
             answers += further_tables(report.stage, own)
-        # An artifact without an answer is also stored, but its path would not help the user.
+        # An artifact is also stored if there is no answer, but then its path would not help the user.
         lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE and report.content is not None:
-        # Imported here: most stages draw nothing.
+        # Imported here, because most stages draw nothing.
         from walkerlab.views.figures.stage import draw_at_once
 
         figures = draw_at_once(report.stage, report.content, report.run_dir, anew=not report.reused)

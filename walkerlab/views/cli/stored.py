@@ -93,12 +93,12 @@ def state_of(step: Step) -> str:
 
 
 def explain_state(step: Step) -> str:
-    """Explain the state of a result, or return '' if it needs no explanation."""
+    """Say why a result has its state, or return '' if that needs no explanation."""
     return "" if step.reason in (artifact.NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
 def explain_states(steps: Sequence[Step]) -> Iterator[str]:
-    """Explain each stage's state. A repeated reason refers to the first stage that has it."""
+    """Explain the state of each stage. If several stages have the same reason, all but the first refer to the first."""
     first: dict[str, str] = {}
     for step in steps:
         reason = executor.short_reason(explain_state(step)) if step.action == "leave out" else explain_state(step)
@@ -185,9 +185,9 @@ def row(name: str, variable: content.Variable) -> list[str]:
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete the stages' files of one run or, with `every`, of all runs, and remove folders that become empty.
+    """Delete the files of one run or, if `every` is true, of all runs, and remove folders that become empty.
 
-    The user has to confirm this unless `yes` is set.
+    The user has to confirm this unless `yes` is true.
     Raises typer.BadParameter if there is no terminal for the question, StorageError if a file cannot be removed, and,
     with `--no-wait`, LockedError while another process works in a folder.
     """

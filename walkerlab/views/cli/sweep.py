@@ -74,7 +74,7 @@ def sweep(request: SweepRequest) -> None:
     chosen, address = parse_engine(request.engine)
     loaded = request.loaded
     over = request.over or ()
-    block = loaded.config.sweep or Sweep()  # used where no option is given
+    block = loaded.config.sweep or Sweep()  # its values stand for options that are not given
     own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
     question = build_sweep(
         request.stage or block.stage,
@@ -141,7 +141,7 @@ def format_duration(seconds: float) -> str:
 
 
 def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
-    """Return the entries that the JSON objects of a planned and of a finished sweep share."""
+    """Return the entries that both a planned and a finished sweep have in their JSON objects."""
     return {
         "stage": "sweep",
         "run_dir": str(request.folder.path),

@@ -1,1 +1,1 @@
-"""The interactive page of `walkerlab explore`: walks computed on request over a loopback connection."""
+"""The interactive page of `walkerlab explore`, for which a server on this machine computes walks."""

@@ -1,7 +1,8 @@
-"""The server of `walkerlab explore`: loopback only, protected by a token, with worker processes.
+"""The server of `walkerlab explore`. It listens only to this machine, requires a token, and computes in worker
+processes.
 
-Background jobs write a report or a GIF into the runs folder. The page is the report's player and style with a script
-that queries the server.
+Background jobs write a report or a GIF into the runs folder. The page has the player and the style of the report, and a
+script that sends requests to the server.
 """
 
 import contextlib
@@ -41,7 +42,7 @@ JOB_PROGRAM = (
     "from walkerlab.pipeline.run.workers import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"
 )
-"""Program that runs a command as `python -m walkerlab` does, and ends when the server ends."""
+"""Program that runs a command like `python -m walkerlab`, and ends when the server ends."""
 
 
 class Job:
@@ -75,7 +76,7 @@ class Job:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(STORING_PATIENCE_S)
             with contextlib.suppress(ProcessLookupError):
-                # The command leads its own session, so this also ends the workers that it has started.
+                # The command leads a session of its own, so this also ends the workers that it has started.
                 os.killpg(process.pid, signal.SIGKILL)
 
     def _make(self, kind: str, question: ExploredConfig) -> None:
@@ -102,7 +103,7 @@ class Job:
 
         Raises RuntimeError with its last message if it fails.
         """
-        # With -P, modules in the working folder cannot take the place of the real ones.
+        # With -P, Python imports no modules from the working folder in place of the real ones.
         command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
         # The output goes to a file, because a pipe would fill up while only stderr is read.
@@ -173,7 +174,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
             closeup_m=1.0,
             view=(0, 0, 1, 1),
         ),
-        # Only the package's own files are markup. All other texts are escaped.
+        # Only files of this package count as markup. All other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),
     )
@@ -193,7 +194,7 @@ class Desk:
     """A worker process that answers only the newest waiting request."""
 
     def __init__(self, drops: bool = False) -> None:
-        """Start the worker. With `drops`, a new request cancels the one in progress."""
+        """Start the worker. If `drops` is true, a new request cancels the one in progress."""
         self.drops = drops
         self.worker = self._hire()
         self._turn = threading.Lock()
@@ -202,7 +203,7 @@ class Desk:
 
     def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
-        if self.drops:  # background work yields to other processes
+        if self.drops:  # work in the background gives way to other processes
             os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICENESS)
         return worker
 
@@ -214,18 +215,19 @@ class Desk:
         with self._count:
             self._newest += 1
             number = self._newest
-        # The worker is busy with an earlier request, for which nobody waits any more.
+        # The worker is busy with an earlier request, and nobody waits for that any more.
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
             deaths = 0
-            # The call is repeated if the signal for an earlier request arrived late, or if the worker died while idle.
+            # The call is repeated if the signal to drop an earlier request arrived late, or if the worker died while
+            # idle.
             while number == self._newest:
                 try:
                     answer = self.worker.do(call)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    # The signal for an earlier request kills workers that have no handler yet.
+                    # The signal to drop a request kills a worker that has no handler yet. This is no fault of the call.
                     deaths += error.exit_code_of_worker != -GIVE_WAY
                     if deaths > 1:
                         return failure(500, error.message, error.advice)
@@ -253,7 +255,8 @@ class Server(ThreadingHTTPServer):
         self.token = secrets.token_urlsafe(16)
         self.job = Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
-        # Curves plotted in the background must not delay the answer to a moved slider, so they have their own worker.
+        # Curves are computed in the background by another worker, so that they do not delay the answer to a moved
+        # slider.
         self.desk = Desk()
         self.background = Desk(drops=True)
         self._thread: threading.Thread | None = None
@@ -383,9 +386,9 @@ class Handler(BaseHTTPRequestHandler):
             self.answer(*failure(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's"))
 
     def check_origin(self) -> bool:
-        """Check that this server's page sent the request, and answer with status 403 if not. Return whether it did."""
+        """Return whether this server's page sent the request. If not, answer with status 403."""
         origin = f"http://{self.server.host}"
-        # Pages of other sites can also send requests to this machine, but cannot change these headers.
+        # A page of another site can also send requests to this machine, but cannot change these headers.
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", origin) == origin:
             return True
         self.answer(*failure(403, "only this server's own page may send requests"))
@@ -400,8 +403,8 @@ class Handler(BaseHTTPRequestHandler):
         return self.headers.get("Authorization", "").removeprefix("Bearer ")
 
     def check_token(self, token: str) -> bool:
-        """Check the token, and answer with status 401 if it is wrong. Return whether it is right."""
-        # An ordinary comparison takes longer the more characters are right, which would help to guess the token.
+        """Return whether a token is right. If not, answer with status 401."""
+        # An ordinary comparison takes longer if more characters are right, which would help to guess the token.
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))
@@ -414,7 +417,7 @@ class Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
         if status == 200 and "text/html" in kind:
-            # Links between the pages of a report carry no token.
+            # The cookie is needed because links between the pages of a report have no token.
             headers["Set-Cookie"] = f"{self.server.cookie}={self.server.token}; HttpOnly; SameSite=Strict"
         if policy:
             headers["Content-Security-Policy"] = policy

@@ -1,4 +1,4 @@
-"""Answers to the page's requests, computed in a worker: summaries of stages, and motions to draw."""
+"""Answer the page's requests, in a worker: summaries of stages, and motions to draw."""
 
 import json
 import math
@@ -28,9 +28,9 @@ INITIAL_KEYS: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
-"""Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
+"""Keys that the page shows before the user searches, in this order. An entry that ends in a dot stands for a block."""
 DRIVE_BLOCKS: Final = ("walker.hip.", "push_off.")
-"""Blocks of which only non-zero keys are shown before any search."""
+"""Blocks of which the page shows only non-zero keys before the user searches."""
 HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
@@ -39,12 +39,12 @@ HIDDEN_KEYS: Final = (
 SLIDER_FACTOR: Final = 5.0
 """Factor between a slider's initial value and either end of its range."""
 WIDE_SLIDER_FACTOR: Final = 100.0
-"""Factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
+"""The same factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
 MIN_LOGARITHMIC_RATIO: Final = 100.0
 """Ratio of bounds above which a slider is logarithmic."""
 BISECTIONS: Final = 10
-"""Number of bisections to find the last valid value of a slider."""
+"""Number of bisections in the search for the last valid value of a slider."""
 
 
 def adjustable(start: schema.Config, config: schema.Config) -> Iterator[dict[str, Any]]:
@@ -71,7 +71,7 @@ def adjustable(start: schema.Config, config: schema.Config) -> Iterator[dict[str
 
 
 def rank(key: str, first: Any) -> int | None:
-    """Return the position of a key among those shown before any search, or None if it appears in searches only."""
+    """Return the position of a key among those shown before any search, or None if only a search shows it."""
     if (key.startswith(DRIVE_BLOCKS) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
     places = (
@@ -106,9 +106,9 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: schema.Co
         by = WIDE_SLIDER_FACTOR if any(part in key for part in BY_MAGNITUDE) else SLIDER_FACTOR
         least, most = sorted((first / by, first * by))
         logarithmic = first > 0.0 and low >= 0.0 and high > MIN_LOGARITHMIC_RATIO * low
-        # A slider that starts close to zero must reach the typical size.
+        # A slider that starts close to zero must nevertheless reach the typical size.
         most = max(most, ordinary) if logarithmic else most
-    # The slope's bounds are in radians, unlike its slider.
+    # The bounds of the slope are in radians, but its slider is in degrees.
     if unit != "deg":
         least = max(least, low)
         most = min(most, high)
@@ -122,7 +122,7 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: schema.Co
 
 
 def ordinary_size(key: str, unit: str, start: schema.Config) -> float:
-    """Return the typical size of a quantity with this unit for the walker, or 0 if unknown."""
+    """Return the typical size that a quantity with this unit has in the walker, or 0 if it is unknown."""
     mass = start.walker.total_mass_kg
     leg = start.walker.leg_length_m
     gravity = start.gravity_m_s2
@@ -162,19 +162,19 @@ Answered = tuple[int, dict[str, Any]]
 """HTTP status and JSON object."""
 SUPERSEDED: Final[Answered] = 409, {"error": {"message": "superseded by a newer request", "advice": ""}}
 MAX_STEPS_SHOWN = 100
-"""Maximum number of steps shown, enough to see one gait change into another."""
+"""Maximum number of steps to show, which is enough to see one gait change into another."""
 GIVE_WAY = signal.SIGUSR1
 """Signal that makes a worker abandon its request."""
 
 
 class SupersededError(BaseException):
-    """Raised when a newer request waits. It is a BaseException, so that no handler mistakes it for a failure."""
+    """Raised if a newer request waits. It is a BaseException, so that no handler mistakes it for a failure."""
 
 
 class GivingWay(Silent):
     """Progress reporter that abandons a request when a newer one waits, but only between two gaits.
 
-    Acting on the signal immediately might interrupt an import.
+    Acting on the signal at once could interrupt an import.
     """
 
     def __init__(self) -> None:
@@ -216,14 +216,14 @@ class ExploredConfig:
 
     @property
     def loaded(self) -> loader.LoadedConfig:
-        """The resolved config, with its warnings.
+        """The config as it is loaded, with its warnings.
 
         Raises ConfigError if it is invalid.
         """
         return resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refusal(self, error: WalkerlabError) -> Answered:
-        """Describe why the config is invalid, and name the change responsible if it can be identified."""
+        """Describe why the config is invalid, and if possible name the change that made it so."""
         key = next((key for key in self.changes if key in error.message), next(iter(self.changes), None))
         value = None if key is None else self.changes[key]
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
@@ -248,7 +248,7 @@ def walk(question: ExploredConfig) -> Answered:
         loaded = question.loaded
         config = loaded.config
         stages = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
-        # Compute the walks first: they store the gait, so that it need not be found again.
+        # The walks come first, because they store the gait, which then need not be found again.
         answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*stages, "fixedpoint")}
     except ConfigError as error:
         return question.refusal(error)
@@ -280,7 +280,7 @@ def numbers(question: ExploredConfig) -> Answered:
 
 
 def follow_gaits(question: ExploredConfig) -> Answered:
-    """Follow gaits over one key: values, quantities and stability along each model's branches.
+    """Follow gaits over one key, and return values, quantities and stability along the branches of each model.
 
     The request's changes contain the block `continuation`: key, ends and points. The status is 409 if a newer request
     has arrived.
@@ -292,7 +292,7 @@ def follow_gaits(question: ExploredConfig) -> Answered:
         return question.refusal(error)
     except SupersededError:
         return SUPERSEDED
-    # Attractors are skipped: they have step periods but are not branches.
+    # Attractors also have step periods, but they are no branches.
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if is_walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}

@@ -28,13 +28,13 @@ MAX_FILL = 0.95
 LEGEND_ROWS = 3
 """Number of legend rows that fit in a figure's nominal height. Longer legends make the figure taller."""
 HEIGHT_EXPONENT = 0.7
-"""A figure's height is proportional to its width raised to this power. It is below 1, because text hardly shrinks."""
+"""Power of a figure's width to which its height is proportional. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_PLAIN_NUMBER: Final = 1e4
-"""Largest number written without an exponent."""
+"""Largest number that labels show without an exponent."""
 
 
 @contextlib.contextmanager
@@ -50,7 +50,7 @@ def is_narrow() -> bool:
 
 
 class ShownFigure(Figure):
-    """Figure that notebooks show as a picture, even if they have not set up matplotlib."""
+    """Figure that a notebook shows as a picture, even if it has not set up matplotlib."""
 
     def _repr_png_(self) -> bytes:
         file = io.BytesIO()
@@ -59,10 +59,11 @@ class ShownFigure(Figure):
 
 
 def blank(height: float) -> Figure:
-    """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
+    """Create a figure of the style's width. `height` (in) applies to the default width. It shrinks less than the width
+    does."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** HEIGHT_EXPONENT), layout="constrained")
-    # The canvas measures texts, on which the layout depends.
+    # The layout depends on the sizes of texts, which the canvas measures.
     FigureCanvasAgg(figure)
     return figure
 
@@ -122,12 +123,12 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
 
 
 def settle(figure: Figure) -> None:
-    """Lay the figure out once, so that all its files look the same."""
+    """Lay the figure out, once for all of its files, so that they look the same."""
     engine = figure.get_layout_engine()
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
     break_lines(figure)
-    # Wrapped labels and axes of equal scale change the layout, so it is computed again.
+    # The layout is computed again, because wrapped labels and axes of equal scale have changed it.
     engine.execute(figure)
     figure.set_layout_engine(None)
 
@@ -149,7 +150,7 @@ RASTER_KINDS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
-    """Return the figure as a file of one kind. `name` makes the ids in an SVG unique among figures."""
+    """Return the figure as a file of one kind. `name` keeps the ids in an SVG different from those of other figures."""
     # Files of equal figures are equal to the byte, so they must not contain a date or a version.
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
@@ -159,7 +160,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
         "tiff": {"pil_kwargs": {"compression": "tiff_lzw"}},
     }
     file = io.BytesIO()
-    # By default, matplotlib makes ids from random numbers.
+    # Without a salt, matplotlib would make ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(file, format=kind, dpi=dpi if kind in RASTER_KINDS else PNG_DPI, **undated[kind])
     return file.getvalue()
@@ -167,7 +168,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure's files as bytes, with its caption."""
+    """Files of a figure as bytes, and its caption."""
 
     svg: bytes
     png: bytes
@@ -177,6 +178,6 @@ class Drawing:
 def files_of(
     figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
 ) -> list[bytes]:
-    """Lay out a figure and return a file of each kind. `name` makes SVG ids unique among figures."""
+    """Lay out a figure and return a file of each kind. `name` is as in `as_file`."""
     settle(figure)
     return [as_file(figure, kind, name, title, dpi) for kind in kinds]

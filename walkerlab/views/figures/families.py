@@ -46,7 +46,7 @@ MODEL_COLOURS: Final = {"rigid": BLUE, "contact": ORANGE}
 BIFURCATION_MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
 POINTS_FROM_FLIP: Final = (
-    16  # points plotted between a flip and the first gait computed on the branch that starts there
+    16  # number of points plotted between a flip and the first gait computed on the branch that starts there
 )
 OTHER_GAITS: Final = GREEN
 """Colour of gaits outside the period-doubling cascade of the one-step gait."""
@@ -54,7 +54,7 @@ OTHER_GAITS: Final = GREEN
 
 @dataclass(frozen=True)
 class DrawnBranch:
-    """A branch of gaits, or a bifurcation curve over two parameters, with its model."""
+    """A branch of gaits of a model, or a bifurcation curve over two parameters."""
 
     model: str
     group: Group
@@ -66,7 +66,7 @@ class DrawnBranch:
 
     @property
     def is_other(self) -> bool:
-        """Whether the branch is outside the cascade: its period is not a power of two."""
+        """Whether the branch is outside the cascade, because its period is not a power of two."""
         return self.period & (self.period - 1) != 0
 
     @property
@@ -101,7 +101,8 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Read a quantity along a branch and at its bifurcations. A stretch between two points is stable if both are."""
+    """Read a quantity along a branch and at its bifurcations. It is stable between two points if the gaits at both
+    are."""
     value = group["value"]
     quantity = group[name]
     stable = group["stable"].astype(bool)
@@ -114,14 +115,14 @@ def curve_of(group: Group, name: str) -> Curve:
     # A bifurcation counts as stable, so that stable stretches reach up to it.
     known = np.insert(stable, places, True)
     on_mark = np.insert(np.zeros(stable.size, bool), places, True)
-    # Two neighbouring bifurcations have no gait between them that would show stability.
+    # No gait between two neighbouring bifurcations shows whether gaits are stable there, so they count as unstable.
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
     marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
     return Curve(value, quantity, between, tuple(marks))
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step along a branch, and the bifurcations, and return the kinds of the bifurcations.
+    """Plot a quantity of every step along a branch, and its bifurcations, and return the kinds of these.
 
     Lines are solid where gaits are stable, otherwise dashed.
     """
@@ -144,7 +145,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the parameter values and quantities to plot between two points of a branch, given by index."""
+    """Return the parameter values and quantities to plot between the points `begin` and `end` of a branch."""
     # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance. A
     # straight line to the first computed gait would show a sharp corner.
     value = curve.value[begin : end + 1]
@@ -164,16 +165,16 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 
 ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 MARGIN: Final = 0.06
-"""Margin around the stable gaits, relative to their span. Unstable branches are cut off beyond it."""
+"""Margin around the stable gaits, relative to their span. Beyond it, unstable branches are cut off."""
 MIN_PANEL_SPAN: Final = 0.05
-"""Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
+"""Minimum fraction of the full range that panel (b) spans, and of all values that a vertical axis spans.
 """
 MIN_LABEL_DISTANCE: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
 MAX_DETAIL_FRACTION: Final = 0.8
-"""The bifurcations get panels of their own if their range is less than this fraction of the full range."""
+"""Bifurcations get a separate panel if their range is less than this fraction of the full range."""
 POINTS_BETWEEN: Final = 16
-"""Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
+"""Number of points per interval of a branch at which multipliers are plotted and extremes of a quantity are sought."""
 
 
 def draw_branches(results: Results) -> Drawn:
@@ -220,8 +221,8 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait with the
-    fewest steps is listed.
+    """List (parameter value, steps) of the gaits that are born in folds. Of gaits whose labels would overlap, list only
+    the one with the fewest steps.
     """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
@@ -236,7 +237,8 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
 
 
 def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
-    """Label gaits born in folds above the axes, because they may be stable only in windows as narrow as a line."""
+    """Label gaits born in folds above the axes, because those that are stable only in a narrow window are hard to
+    see."""
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
@@ -249,7 +251,7 @@ def closer_view(results: Results) -> tuple[float, float] | None:
     values = [item["value"] for item in summary["bifurcations"]]
     if not values:
         return None
-    # Attractors go on beyond the last bifurcation.
+    # Attractors go on beyond the last bifurcation, up to the value at which they are lost.
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least = min(values)
     most = max(*ends, max(values))
@@ -278,7 +280,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
 
 def interpolate(along: NDArray[Any]) -> NDArray[np.float64]:
     """Interpolate values at the points of a branch, with `POINTS_BETWEEN` points per interval."""
-    # Imported here: no other figure needs it.
+    # Imported here, because no other figure needs it.
     from scipy.interpolate import PchipInterpolator
 
     count = len(along)
@@ -290,7 +292,8 @@ def interpolate(along: NDArray[Any]) -> NDArray[np.float64]:
 
 def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     """Return densely sampled multipliers along a branch (points, multipliers), largest first."""
-    # The coefficients of their polynomial are interpolated, because the multipliers have kinks where two of them meet.
+    # The coefficients of the polynomial with these zeros are interpolated, because multipliers have kinks where two
+    # meet.
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
     roots = np.array([np.roots(row) for row in interpolate(np.array([np.poly(row).real for row in known]))])
     return np.take_along_axis(roots, np.argsort(-np.abs(roots), axis=1), axis=1)
@@ -301,14 +304,14 @@ GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMI
 DASHES: Final = ("-", "--", "-.", ":")
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 PLANE_HALF_WIDTH: Final = 1.6
-"""Half-width of the visible part of the complex plane. Multipliers of unstable gaits may lie far outside."""
+"""Half the width of the visible part of the complex plane. Multipliers of unstable gaits may lie far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:
     """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right)."""
     (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
     branches = list(branches_of(results))
-    shortest = min((branch.period for branch in branches), default=1)  # 2 steps for legs that differ
+    shortest = min((branch.period for branch in branches), default=1)  # 2 steps if the legs differ
     drawn = [branch for branch in branches if branch.period == shortest]
     looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
     key = []
@@ -352,7 +355,8 @@ OTHER_PERIOD, APERIODIC, NO_WALKING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
 def draw_plane(results: Results) -> Drawn:
-    """Colour the plane by attractor, and plot the bifurcation curves over it, styled by model, kind and period."""
+    """Colour the plane by attractor, and plot the bifurcation curves in it. Their style shows model, kind and
+    period."""
     figure, axes = panels(4.4)
     regions = results[CONTINUATION_STAGE].groups.get("rigid/regions")
     key: list[Artist] = []

@@ -1,4 +1,4 @@
-"""Figures of ground forces, with the friction cone, and of the energy lost in each step, by cause."""
+"""Figures of ground forces, with the friction cone, and of the causes of the energy lost in each step."""
 
 from typing import Any, Final
 
@@ -23,11 +23,11 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
 SHOWN_STRIDES = 2
-"""Number of strides in the force figure. With more, single impacts could not be told apart."""
+"""Number of strides in the figure of forces. With more of them, single impacts could not be told apart."""
 SHOWN_STEPS = 40
-"""Number of steps in the loss figure."""
+"""Number of steps in the figure of energy losses."""
 SHOWN_LOADS: Final = 0.99
-"""Fraction of the loaded samples that the force axis shows. Impact forces of many times the weight lie beyond it."""
+"""Fraction of the samples with load that fit on the axis of the force. Impacts of many times the weight do not fit."""
 NEGLIGIBLE_LOSS: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 
@@ -40,7 +40,7 @@ def draw_forces(results: Results) -> Drawn:
     every = whole[NORMAL_FORCE]
     loads = walk[NORMAL_FORCE]
     pulls = walk[FRICTION]
-    # Upper limit of the normal-force axis (N).
+    # The axis of the normal force ends at this value (N).
     top = 1.1 * float(np.quantile(loads[loads > 0.0], SHOWN_LOADS)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
@@ -65,7 +65,7 @@ def draw_forces(results: Results) -> Drawn:
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
-    # Without friction, the axis would begin and end at zero.
+    # Otherwise the axis would begin and end at zero if there is no friction.
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
     of_normal = walk.label("normal force", NORMAL_FORCE)
@@ -86,8 +86,10 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost in each step by cause (label, colour). The knees get what no other cause explains."""
-    # Steps are divided at the last sample before a touchdown, so that an impact counts entirely for the step it starts.
+    """Return the energy (J) lost in each step by cause (label, colour). What no other cause explains is lost in the
+    knees."""
+    # Steps are divided at the last sample before a touchdown, so that the whole impact belongs to the step that it
+    # starts.
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
     supplied = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
@@ -99,7 +101,8 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """Plot a stacked bar for each step. The caption gives the mean loss (J) by cause, without the first step."""
+    """Plot the losses in each step as a stacked bar. The caption gives the mean loss (J) by cause, without the first
+    step."""
     by_cause = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(by_cause.values())).size))
@@ -110,7 +113,7 @@ def draw_losses(results: Results) -> Drawn:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set(xlabel="step", ylabel="energy lost (J)")
     add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in by_cause])
-    # The first step does not begin with an impact. It counts only if there is no other.
+    # The first step does not begin with an impact, so it counts only if there is no other step.
     later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in by_cause.items()}
     return figure, (later, sum(later.values()))
 

@@ -25,7 +25,7 @@ LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
 PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
 MIN_NAMED_FRACTION: Final = (
-    0.1  # a parameter is named if its change is at least this fraction of the combination's largest
+    0.1  # the name of a combination lists parameters whose change is at least this fraction of the largest one
 )
 
 
@@ -39,7 +39,8 @@ def axis_name(quantity: str) -> str:
 
 
 def draw_steps(results: Results) -> Drawn:
-    """Plot measured steps over predicted ones. The caption gives their number and the fraction inside the bands."""
+    """Plot measured values of steps over predicted ones. The caption gives the number of steps and the fraction in the
+    bands."""
     steps = results[IDENTIFY_STAGE].groups["steps"]
     names = quantities(steps)
     number = 1 + steps["step"]
@@ -62,7 +63,7 @@ def draw_steps(results: Results) -> Drawn:
 
 
 def draw_residuals(results: Results) -> Drawn:
-    """Plot the residuals of each step and, if angles were measured, of the angles over the phase of the step."""
+    """Plot the residuals of each step and, if angles were measured, those of the angles over the phase of the step."""
     groups = results[IDENTIFY_STAGE].groups
     steps = groups["steps"]
     samples = groups.get("samples")
@@ -100,7 +101,8 @@ def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
 
 
 def draw_trade_off(results: Results) -> Drawn:
-    """Plot the 95 % region of the two worst-determined combinations, over the two parameters that show it best."""
+    """Plot the 95 % region of the two worst-determined combinations, in the plane of the two parameters that show it
+    best."""
     rows, freedom = (results[IDENTIFY_STAGE].summary[name] for name in ("estimates", "degrees_of_freedom"))
     semi_axis = semi_axis_of_region(freedom)
     moves = results[IDENTIFY_STAGE].groups["worst"]["moves"]
@@ -165,7 +167,8 @@ MEASUREMENT_COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
 
 
 def draw_errors(results: Results) -> Drawn:
-    """Plot the standard error of each parameter over the number of steps, a curve for each measurement and start."""
+    """Plot the standard error of each parameter over the number of steps, with a curve for each measurement and
+    start."""
     summary = results["plan"].summary
     group = results["plan"].groups["errors"]
     rows = summary["measurements"]

@@ -1,4 +1,4 @@
-"""Illustrations: their names, texts, required results and drawing functions."""
+"""Illustrations, with names, texts, required results and drawing functions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,13 +17,13 @@ WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
 Results = Mapping[str, Identified]
 """Results by stage."""
 Drawn = tuple[Figure, tuple[Any, ...]]
-"""A figure, and the arguments of its caption template."""
+"""A figure, and the arguments for the template of its caption."""
 Draw = Callable[[Results], Drawn]
 
 
 @dataclass(frozen=True)
 class Need:
-    """Variables that a figure needs from the result of a stage, and optionally the scene whose reference it needs."""
+    """Variables that a figure needs from the result of a stage, and whether it needs the scene of a study."""
 
     stage: str
     group: str
@@ -32,9 +32,9 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return the reason why the requirement is not met, or None if it is met.
+        """Return the reason why the results do not meet this need, or None if they do.
 
-        absent  why each missing result is missing, by stage
+        absent  reasons why results are missing, by stage
         """
         if self.stage not in results:
             reason = absent.get(self.stage)
@@ -52,7 +52,7 @@ class Illustration:
 
     name: str  # file name without suffix
     needs: tuple[Need, ...]  # required results; other results are drawn if available
-    draw: Draw  # draws the figure in the current style and returns it with the caption's arguments
+    draw: Draw  # draws the figure in the current style, and returns it and the caption's arguments
     number: int | None = None  # number in the paper; None if the paper has no such figure
     words: str = ""  # file in `words/` with title, caption and text alternative; default: the figure's name
     scene: str = ""  # first argument of the templates, if one file serves several figures
@@ -70,7 +70,7 @@ class Illustration:
 
     @property
     def alt_text(self) -> str:
-        """Text alternative of one or two sentences, possibly empty."""
+        """Text alternative of one or two sentences, or ''."""
         return self.say("seen")
 
     @property
@@ -84,7 +84,7 @@ class Illustration:
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
         """Return the reason why the illustration cannot be drawn, or None if it can.
 
-        absent  why each missing result is missing, by stage
+        absent  reasons why results are missing, by stage
         """
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)

@@ -35,7 +35,7 @@ def discrete(colours: Sequence[str]) -> dict[str, Any]:
 
 
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
-    """Draw each cell in the colour of its kind, using `draw`, and return the legend entries."""
+    """Draw each cell in the colour of its kind, by calling `draw`, and return the legend entries."""
     draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
     return patches((colour, label) for colour, label, _ in kinds)
 
@@ -50,7 +50,8 @@ def outcome_kinds(outcomes: Any) -> list[tuple[str, str]]:
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
-    """Return cell edges halfway between neighbouring values (geometric mean if the values are spaced geometrically)."""
+    """Return the edges of cells midway between neighbouring values (at the geometric mean if the axis is
+    logarithmic)."""
     scale = np.log(centres) if is_logarithmic(centres) else centres
     if scale.size == 1:
         scaled = np.array([scale[0] - 0.5, scale[0] + 0.5])
@@ -66,7 +67,7 @@ def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
         return False
     gaps = np.diff(np.log(np.sort(values)))
     plain = np.diff(np.sort(values))
-    # The logarithms must be spaced evenly, and more evenly than the values themselves.
+    # The logarithms of the values must be evenly spaced, and more evenly than the values themselves.
     return bool(gaps.max() / gaps.min() < min(1.01, plain.max() / plain.min()))
 
 
@@ -90,7 +91,7 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
 def draw_starts(results: Results) -> Drawn:
-    """Plot the starts for both models on equal axes, coloured by outcome, with contours of the number of steps."""
+    """Plot a map of starts for each model, coloured by outcome, with contours of the number of steps."""
     cells = results[walks.TUNE_STAGE]["map"]
     summary = results[walks.TUNE_STAGE].summary
     across = cells[SWING_FACTOR]
@@ -130,12 +131,12 @@ NO_ATTRACTOR: Final = -1
 
 
 def draw_basins(results: Results) -> Drawn:
-    """Plot attractors and failures by colour (left), and the number of steps to settle by brightness (right)."""
+    """Plot which attractor or failure each start leads to (left), and in how many steps walks settle (right)."""
     summary = results[BASIN].summary
     cells = results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
-    # Of a grid over three coordinates, the middle plane is shown.
+    # If the grid has three coordinates, the figure shows its middle plane.
     middle = tuple(size // 2 for size in cells["outcome"].shape[2:])
     outcome, attractor, to_settle = (cells[name][..., *middle] for name in ("outcome", "attractor", "steps_to_settle"))
 
@@ -146,7 +147,7 @@ def draw_basins(results: Results) -> Drawn:
     figure, (left, right) = canvas.panels(3.9, 1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), kinds_of_cells(outcome, attractor, summary))
     left.set_title("(a) outcome")
-    # A logarithmic scale has no zero, so walks that are settled from the start get the colour of one step.
+    # A logarithmic scale has no zero, so walks that are settled from the start have the colour of one step.
     settled = np.ma.masked_where(attractor == NO_ATTRACTOR, to_settle.clip(min=1))
     right.set_title("(b) steps to the attractor")
     if settled.count():
@@ -215,7 +216,7 @@ VERDICT_COLOURS: Final = {
 
 
 class OverStiffness:
-    """Figure with two panels, outcomes and errors, over stiffness and a second coordinate."""
+    """Figure with two maps, of outcomes and of errors, over stiffness and a second coordinate."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         self.cells = cells
@@ -236,7 +237,8 @@ class OverStiffness:
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
     def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
-        """Shade the selected cells by error, clipped to `ends`, and give cells of other kinds their fixed colours."""
+        """Shade the cells `there` by their error, clipped to `ends`, and draw the cells of `others` in their fixed
+        colours."""
         shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")

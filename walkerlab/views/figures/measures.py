@@ -23,12 +23,12 @@ FIGURE_HEIGHT = 4.6
 LABEL_SIZE = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Up to this length (leg lengths), a dimension gets a label but no arrow, and a sole no mark at its centre."""
+"""Length (leg lengths) up to which a dimension gets no arrow, only a label, and a sole no mark at its centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 SECOND_LEG_ANGLE = -0.3
-"""Angle (rad) at which the second leg, or its thigh if it has a knee, is drawn."""
+"""Angle (rad) at which the second leg (or its thigh, if it has a knee) is drawn."""
 BENT_ANGLE = -0.75
 """Angle (rad) at which the shank of the second leg is drawn."""
 LEFT_OF_LEG = 0.62
@@ -49,7 +49,7 @@ PARTS_ROOM = 1.5
 
 @dataclass(frozen=True)
 class Length:
-    """A horizontal or vertical dimension (m) from the config, between two points."""
+    """A horizontal or vertical dimension (m) between two points, from the config."""
 
     key: str
     value: float
@@ -63,9 +63,9 @@ class Length:
 
 @dataclass(frozen=True)
 class UprightLeg:
-    """Geometry of one leg in m, upright with its sole at the origin."""
+    """Geometry of one leg, in m. The leg is upright, with its sole at the origin."""
 
-    joints: tuple[Point, ...]  # points of the leg's line from the hip down, without the sole
+    joints: tuple[Point, ...]  # hip and any knee, from the top down
     centre: Point  # centre of the sole's arc
     radius: float
     lengths: tuple[Length, ...]
@@ -92,7 +92,7 @@ def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
 
 
 def value_of(walker: Any, key: str, *otherwise: float) -> float:
-    """Return the value at a dotted key of the walker, or `otherwise` if it has none."""
+    """Return the value at a dotted key of the walker, or `otherwise` if the walker lacks the key."""
     *blocks, last = key.split(".")
     return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
 
@@ -139,7 +139,8 @@ def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
-    """Draw the walker's dimensions as a file of one kind (svg, pdf, png). Equal walkers and names give equal bytes."""
+    """Draw the walker's dimensions, and return the bytes of a file of this kind (svg, pdf, png). Equal walkers and
+    names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
     with figure_style():
         figure = draw_parts(walker) if isinstance(walker, AssembledWalker) else draw_upright(walker)
@@ -147,8 +148,8 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
-    """Draw an upright leg with its dimensions, and the other leg faintly behind it. Legs that differ have a panel
-    each, the first leg above.
+    """Draw an upright leg with its dimensions, and the other leg faintly behind it. If the legs differ, each has a
+    panel, with that of the first leg above.
     """
     legs = [measure_leg(each) for each in dict.fromkeys((walker, walker.second))]
     views = [frame_leg(leg) for leg in legs]
@@ -165,7 +166,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
 
 @dataclass(frozen=True)
 class View:
-    """Part of the plane (m) that shows a leg with all its labels, and the positions of the labels."""
+    """Part of the plane (m) in which a leg and all of its labels fit, and the positions of the labels."""
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
     heights: list[float]  # height of each of these labels
@@ -180,7 +181,7 @@ class View:
 def frame_leg(leg: UprightLeg) -> View:
     length = leg.joints[0][1]
     labels, lanes = arrange_labels(leg)
-    # Text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length.
+    # Text has a fixed size, so it takes a fixed fraction of the width, however long the walker is.
     behind = letters([words for words, *_ in labels])
     ahead = [letters([dimension.label for dimension in lane]) for lane in lanes]
     width = (LEFT_OF_LEG + FIRST_LANE) * length / (1.0 - CHARACTER_WIDTH * (behind + sum(ahead)))
@@ -204,7 +205,7 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=LABEL_SIZE)
-    # The other leg is behind and off the ground. If it has a knee, the knee is bent.
+    # The other leg is behind this one and off the ground. Its knee, if it has one, is bent.
     second = [leg.joints[0]]
     angles = (SECOND_LEG_ANGLE, BENT_ANGLE)[: len(other.joints)]
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
@@ -247,19 +248,19 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
 
 
 def letters(texts: Sequence[str]) -> int:
-    """Return the number of characters in the longest line of `texts`, plus a margin."""
+    """Return the number of characters in the longest line of `texts`, and some more as a margin."""
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
 def fit_in_lane(dimension: Length, second: Length, length: float) -> bool:
-    """Whether two dimensions in one lane, and their labels, do not overlap."""
+    """Whether two dimensions fit in one lane without overlapping, including their labels."""
     between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
-    # Slightly less than half of both, so that dimensions may meet end to end.
+    # The factor is slightly below one half, so that dimensions may meet end to end.
     return between > max(0.499 * (dimension.value + second.value), MIN_LABEL_DISTANCE * length)
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
-    """Return label heights as close as possible to the preferred ones, raised where the labels below need room."""
+    """Return the heights of labels, as close as possible to `heights` but raised where the labels below need room."""
     spread_heights = list(heights)
     for place in sorted(range(len(spread_heights)), key=spread_heights.__getitem__):
         spread_heights[place] = max(spread_heights[place], lowest + 0.5 * sizes[place])
@@ -273,7 +274,7 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
     across, up = np.subtract(line[-1], line[-2])
     draw_sole(axes, centre, radius, np.arctan2(across, -up) + SOLE_ANGLES, colour)
-    if radius == 0.0:  # a point foot, perhaps ahead of the leg's line
+    if radius == 0.0:  # a point foot, which may be ahead of the leg's line
         axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
 
 
@@ -299,8 +300,8 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
 
 
 def draw_parts(walker: AssembledWalker) -> Figure:
-    """Draw all bodies, each in its own frame. Of two equal legs, only the second is drawn."""
-    # Imported here: only walkers of parts need their mechanics.
+    """Draw all bodies, each in its own frame. If the legs are equal, only the second is drawn."""
+    # Imported here, because only walkers of parts need their mechanics for a drawing.
     from walkerlab.scene.rigid import level_walker
 
     alike = () if level_walker(walker, gravity=1.0).legs_differ else walker.legs[0]

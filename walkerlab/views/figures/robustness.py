@@ -21,7 +21,7 @@ ROBUSTNESS_STAGE: Final = "robustness"
 PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("sensitivity norm (s/m)", "gaits.{}.gait_sensitivity_norm", lambda norm: norm),
     ("1 − largest multiplier", "gaits.{}.spectral_radius", lambda radius: 1.0 - radius),
-    # Steps down are drawn below zero, and those up (`UP`) above it.
+    # The largest step down is drawn below zero, and that up (`UP`) above it.
     ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
     ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
 )
@@ -41,7 +41,7 @@ ACTUATIONS: Final = {
 """Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
 MAX_ROWS: Final = 4
-"""Maximum number of rows of a table at one point: two models, each with two legs."""
+"""Maximum number of rows that a table has at one point, for two models with two legs each."""
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
 LOWER_PANEL_INCHES = 1.7
@@ -51,9 +51,7 @@ AXIS_LABEL_INCHES = 0.4
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """Return the illustration of a robustness sweep that varies one parameter or compares drives, or None
-    for others.
-    """
+    """Return the illustration of a robustness sweep if it varies one parameter or compares drives, otherwise None."""
     if can_be_drawn(group, parameters):
         return paper_figure(17, (), partial(plot_over_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
@@ -67,7 +65,8 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
 
 
 def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
-    """Plot figure 17. The caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
+    """Plot figure 17. The caption names the parameter and, for each model, the least sensitive gait with its norm
+    (s/m)."""
     x = group[parameter].astype(float)
     axis_text = axis_label(parameter)
     unit = group.variables[parameter].units
@@ -89,7 +88,7 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
 
 
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
-    """Return the values (points,) of a model for each of its rows in a table. Legs that differ have a row each."""
+    """Return the values (points,) of a model for each of its rows in a table, which are two if the legs differ."""
     rows = []
     for row in range(MAX_ROWS):
         if name.format(row) in group.variables:
@@ -99,7 +98,7 @@ def rows_of(group: Group, name: str, model: str) -> list[Values]:
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
-    """Return, for each drive, the points at which it acts alone, or None if the sweep does not compare drives."""
+    """Return, for each drive, the points at which no other one acts, or None if the sweep does not compare drives."""
     if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or ACTUATION_PANELS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
@@ -109,7 +108,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def plot_drives(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
-    """Plot the cost of each drive, and the disturbances that its gaits survive, over speed."""
+    """Plot, over speed, the cost of each drive and the disturbances that gaits with this drive survive."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
@@ -168,7 +167,7 @@ def draw_shares(axes: Axes, steps: Group) -> None:
     """Plot the fraction of walks still upright after each number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
-            # A walk that was cut off has not failed, so it counts as still walking.
+            # A walk that was stopped at the maximum number of steps has not failed, so it counts as still walking.
             ended = np.sort(walks[walks < last])
             going = 1.0 - np.arange(ended.size + 1) / walks.size
             at = np.concatenate(([1.0], ended, [min(walks.max(), last)]))

@@ -1,4 +1,4 @@
-"""The `plot` stage: draws every figure whose results are available, as SVG and PNG.
+"""The `plot` stage: draw every figure whose results are available, as SVG and PNG.
 
 `FIGURES` lists all figures in display order: first those with a figure number from the paper, then the others,
 including those of extensions.
@@ -41,10 +41,10 @@ def run(
     left_out: Sequence[LeftOut] = (),
     early: Content | None = None,
 ) -> Content:
-    """Draw all figures whose results are available into the run's folder.
+    """Draw all figures whose results are available, and store them in the run's folder.
 
     left_out  results that are missing, with reasons
-    early     figures that this run has already drawn, as soon as all their results were there
+    early     figures that this run has already drawn, each as soon as its results were there
 
     Raises StorageError if a figure cannot be stored.
     """
@@ -59,15 +59,15 @@ def run(
             drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))
             progress.advance()
         else:
-            # An earlier run may have drawn the figure from results that no longer exist.
+            # Files of the figure may be left from results that no longer exist.
             for path in paths_of(figure.name).values():
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)
-            # Figures of stages that run only on request are not reported as missing, because nobody asked for them.
+            # A figure of a stage that runs only on request is not reported as missing, because nobody asked for it.
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
                 missing.append({"what": figure.reference, "why": reason})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
-    # Some captions quote run times, which differ from run to run, so the texts count as timings.
+    # The texts count as timings, because some captions quote run times, which differ from run to run.
     summary = {"figures": drawn, "left_out": missing}
     return Content({artifact.FILES_GROUP: artifact.index_files(folder, files)}, summary, timed=("figures",))
 

@@ -40,7 +40,7 @@ SIDEROOM = 0.12
 """Free space on either side of the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""Angles (rad) from the leg's line at which points of a sole lie: all points drawn (`ARC`), and the middle."""
+"""Angles (rad) from the leg's line of points of a sole: all points that are drawn (`ARC`), and the middle one."""
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
@@ -62,7 +62,7 @@ NO_STEPS = Group(
 
 @dataclass(frozen=True, eq=False)
 class Sticks:
-    """Joint positions of a walker in m, along the slope (downhill) and normal to it."""
+    """Joint positions of a walker in m, along the slope (positive downhill) and normal to it."""
 
     time: walks.Array  # (samples,) s
     hip: walks.Array  # (samples, 2)
@@ -71,11 +71,11 @@ class Sticks:
     landings: walks.Array  # (1 + steps, 2) positions of the first stance foot and of each landing
     slope: float  # rad
     knees: walks.Array | None = None  # (samples, leg, 2); None for straight legs
-    radii: tuple[float, float] = (0.0, 0.0)  # radius of each sole's arc, m; the feet are their lowest points
+    radii: tuple[float, float] = (0.0, 0.0)  # radius of each sole's arc, m; `feet` has the lowest points of the soles
     head: walks.Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
     ground: walks.Array | None = None  # (points, 2) outline of the ground; None on even ground
-    pushes: bool = False  # whether the trailing foot pushes off as the other one lands
-    ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
+    pushes: bool = False  # whether the trailing foot pushes off when the other one lands
+    ending: str = ""  # outcome of the walk if it failed, such as fell; otherwise empty
 
     def pushing(self, time: float) -> int | None:
         """Return the leg whose push-off is shown at a time (s), or None if no push-off is shown."""
@@ -85,7 +85,7 @@ class Sticks:
 
     @property
     def top(self) -> walks.Array:
-        """Highest point drawn (samples, 2): the torso's centre of mass, or the hip."""
+        """Highest point that is drawn (samples, 2): the torso's centre of mass or, without a torso, the hip."""
         return self.hip if self.head is None else self.head
 
     @property
@@ -125,7 +125,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the indices of samples in the first cycle: at its start and heel strikes, and some in between."""
+        """Return indices of samples in the first cycle: those at its start and at heel strikes, and some in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, POSTURES_BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         # A walk that ends within its first cycle is drawn up to its end.
@@ -136,7 +136,7 @@ class Sticks:
 
 
 def read_sticks(result: Identified, under: str = "") -> Sticks:
-    """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
+    """Read the joint positions of a stored walk, whose groups have the prefix `under`."""
     config = result.identity.config_slice
     trajectory = result[f"{under}trajectory"]
     walker = config["walker"]
@@ -154,7 +154,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
     radii = sole_radii(walker)
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
-        radii = 0.0, 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
+        radii = 0.0, 0.0  # a compass has point feet in the rigid model, whatever its feet are in the contact model
     levels = ground_levels(steps)
     pushes = config["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
@@ -230,7 +230,8 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: walks.Array) -> None:
-    """Label the landings with their times, and draw an arrow above `path` (samples, 2), labelled with the slope."""
+    """Label the landings with their times. Draw an arrow above `path` (samples, 2) in walking direction, with the
+    slope."""
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -250,7 +251,7 @@ def annotate(axes: Axes, sticks: Sticks, path: walks.Array) -> None:
 
 
 def draw_slope(axes: Axes, sticks: Sticks) -> None:
-    """Draw the ground as a plane or, if uneven, as a level around each foothold, hatched below."""
+    """Draw the ground, hatched below: a plane or, if it is uneven, a level around each foothold."""
     left, right = axes.get_xlim()
     depth = 0.02 * sticks.leg_length
     ends = np.array([left, right])
@@ -319,7 +320,7 @@ FILM_NEEDS = {
     stage: illustration.Need(stage, walks.TRAJECTORY, (*walks.STATE_VARIABLES, *walks.JOINTS), walks.NO_STATES)
     for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
-"""Variables that an animation needs. Steps are not among them, because a walk can end in its first step."""
+"""Variables that an animation needs. They include none of steps, because a walk can end in its first step."""
 FIGURE_2, FIGURE_6 = (
     illustration.paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
     for number, stage, steps_taken in (
@@ -336,7 +337,7 @@ PUSH_SHARE = 0.3
 FILM_SIZE = (6.4, 3.6)
 """Size of a frame (in). Video formats require an even number of pixels along both sides."""
 FILM_DPI = 100
-"""Resolution of a frame (pixels per inch)."""
+"""Resolution of a frame, pixels per inch."""
 STEPS_SHOWN = 4
 RELIEF_HEIGHT = 0.04
 """Maximum height of the magnified ground profile (leg lengths)."""
@@ -364,7 +365,8 @@ def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> w
 
 
 def draw_relief(axes: Axes, sticks: Sticks) -> None:
-    """Draw the ground profile again below the ground, magnified until visible, and print the factor."""
+    """Draw the profile of the ground again, below the ground and magnified until it can be seen, and print the
+    factor."""
     if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[:, 1]).max())):
         return
     room = RELIEF_HEIGHT * sticks.leg_length / roughest
@@ -385,7 +387,8 @@ def moving_lines(sticks: Sticks, at: walks.Array) -> list[walks.Array]:
         lines += [sticks.sole(leg) for leg in range(2)]
     if sticks.head is not None:
         lines.append(np.stack((sticks.hip, sticks.head), axis=1))
-    # Linear interpolation suffices: both sides of a heel strike are samples, so no interval contains its jump.
+    # Linear interpolation suffices, because both sides of a heel strike are samples, so that no interval contains a
+    # jump.
     flat = [line.reshape(line.shape[0], -1) for line in lines]
     places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
     return [sticks.project(place.reshape(at.size, -1, 2)) for place in places]

@@ -20,13 +20,13 @@ GREY: Final = "#7F7F7F"
 PALE: Final = "#EDEDED"
 
 FIGURE_WIDTH: Final = 7.2
-"""Width of a figure on the page (in): two columns of a journal."""
+"""Width (in) of a figure on the page, equal to two columns of a journal."""
 POINT: Final = 1.0 / 72.0
 """One point (in)."""
 PNG_DPI: Final = 160
 """Resolution of PNGs on the page (pixels per inch)."""
 EXPORT_DPI: Final = 300
-"""Default resolution of exports, as journals ask for (pixels per inch)."""
+"""Default resolution of exports (pixels per inch), as journals require it."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),
@@ -48,14 +48,14 @@ RC: Final = {
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
     "mathtext.fontset": "dejavusans",
-    # Type 42 is TrueType. Many journals reject matplotlib's default, Type 3.
+    # Type 42 is TrueType. The default of matplotlib is Type 3, which many journals reject.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
     "svg.fonttype": "none",
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
 }
-"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc.
+"""Settings that differ from matplotlib's defaults. The user's matplotlibrc has no effect on figures.
 
 Labels, ticks and legends have `font.size`, matplotlib's default.
 """
@@ -68,7 +68,7 @@ NARROW: Final = {
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.0,
 }
-"""Further settings for one-column figures. The superscripts of labels of 7.2 pt are 5 pt high."""
+"""Further settings for one-column figures. Labels of 7.2 pt have superscripts of 5 pt, which can still be read."""
 
 
 @dataclass(frozen=True)

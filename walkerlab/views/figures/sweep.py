@@ -1,4 +1,4 @@
-"""Figures of a sweep: lines over one parameter, maps over two, a scatter plot for each of three or more."""
+"""Figures of a sweep: lines over one parameter, maps over two, and a scatter plot over each of three or more."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -24,11 +24,11 @@ SWEEP_PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
-"""Maximum number of lines, one for each value of a second parameter. With more values, a map is drawn."""
+"""Maximum number of lines, one for each value of a second parameter. For more values, a map is drawn."""
 SWEEP_DASHES: Final = ("-", "--", "-.")
 STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
-"""Maximum number of points plotted in a panel. If there are more, an evenly spaced selection is plotted."""
+"""Maximum number of points in a panel. If there are more, evenly spaced ones are plotted."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
     "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
@@ -39,7 +39,7 @@ AXIS_LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, parameters: Sequence[str]) -> list[str]:
-    """Return the quantities to plot by default: preferred ones that vary, otherwise any that vary."""
+    """Return the quantities to plot by default: the preferred ones that vary or, if none does, any others that vary."""
     varying = []
     for name in group.variables:
         if is_number(group, name) and name not in parameters:
@@ -71,7 +71,7 @@ def illustration(
 def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against: str, _results: Results) -> Drawn:
     """Plot a sweep. The caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
     dimensions = group["outcome"].ndim
-    # If one of two parameters has few values, each gets a line instead of a map.
+    # If one of two parameters has few values, the figure has a line for each of them instead of a map.
     a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
     if against:
         figure = plot_against(group, names, against)
@@ -87,8 +87,8 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
 
 
 def plot_against(group: Group, names: Sequence[str], against: str) -> Figure:
-    """Plot each quantity over the quantity `against`, a row each, and join the points in order if one
-    parameter varies.
+    """Plot each quantity, in a row of its own, over the quantity `against`. If a single parameter varies, join the
+    points in order.
     """
     x, few = spread(group, against)
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -114,7 +114,8 @@ def label(group: Group, name: str) -> str:
 
 
 def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot a row per quantity and a column per parameter, and join the points if one parameter varies monotonically."""
+    """Plot each quantity (row) over each parameter (column), and join the points if one parameter varies
+    monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -139,7 +140,8 @@ def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) 
 
 
 def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]]:
-    """Return a parameter's value at every point of the sweep, as a flat array, and the indices of those to plot."""
+    """Return the value of a parameter at every point of the sweep, as a flat array, and the indices of the points to
+    plot."""
     values = numbers(group, parameter)
     if not is_pointwise(group, parameter):
         dims = group.variables["outcome"].dims
@@ -149,7 +151,7 @@ def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """Draw the stability bound, mark points without an answer (at parameter values `missing`), and set the scales."""
+    """Draw the bound of stability, mark the parameter values `missing`, which have no answer, and set the scales."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
@@ -192,7 +194,8 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
 
 
 def set_scale(axes: Axes, group: Group, parameter: str, which: str) -> None:
-    """Make the axis `which` (x or y) logarithmic if the values are, and label the ticks of a non-numeric parameter."""
+    """Make the axis `which` (x or y) logarithmic if the parameter's values are. If they are words, label the ticks with
+    them."""
     values = group[parameter]
     if is_logarithmic(np.unique(numbers(group, parameter)), span=1.0):
         getattr(axes, f"set_{which}scale")("log")

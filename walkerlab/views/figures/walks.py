@@ -1,4 +1,4 @@
-"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
+"""Figures of the walks of both models: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,18 +42,18 @@ STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
 )
 
 PAPER_STRIDES = 5
-"""Strides shown in the figures over time, as in the paper."""
+"""Number of strides in the figures over time, as in the paper."""
 STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values that a study claims for this scene, or nothing if no study covers the scene."""
+    """Return the values that a study claims for this scene, or () if no study covers it."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk to plot over time. `time` is (samples,) in s."""
+    """A walk to plot over time. `time` has its samples (samples,) in s."""
 
     look: Look  # style of its model
     outcome: str  # how the walk ended
@@ -61,7 +61,7 @@ class DrawnWalk:
     strikes: Array  # (shown steps,) times of the heel strikes, s
     samples: Group  # variables stored over time
     end: int | None = None  # number of samples shown; None for all
-    recorded: bool = False  # whether it was recorded outside walkerlab and has its own name
+    recorded: bool = False  # whether the walk was recorded outside walkerlab; it then has a name of its own
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.samples[name][: self.end]
@@ -91,7 +91,7 @@ def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
 
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
-    """Return a stored walk in the style of its model. A recorded walk is labelled with its own name."""
+    """Return a stored walk in the style of its model. The label of a recorded walk is its name."""
     times = touch_times(result.groups.get(STEPS, Group({})))
     recorded = look is RECORDED
     look = replace(RECORDED, label=str(result.summary["name"])) if recorded else look
@@ -99,12 +99,12 @@ def walk_of(result: Content, look: Look) -> DrawnWalk:
 
 
 def touch_times(steps: Group) -> Array:
-    """Return the times of the heel strikes (s), or nothing if no step was completed."""
+    """Return the times of the heel strikes (s), which are none if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
 def first_strides(walks: list[DrawnWalk], strides: int = PAPER_STRIDES) -> tuple[list[DrawnWalk], str]:
-    """Return the walks' first strides, and ' (the first 5 strides)' for the caption if any walk is longer."""
+    """Return the first strides of the walks and, if any walk is longer, ' (the first 5 strides)' for the caption."""
     cut = [walk.first_strides(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
@@ -159,12 +159,14 @@ FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid mo
 
 
 def redoes_the_procedure(results: Results) -> bool:
-    """Whether the walker is the paper's compass, whose legs the paper calls links."""
+    """Whether the walker is the paper's compass, so that the figure repeats one of the paper and names legs as it
+    does."""
     return "paper_start" in results[TUNE_STAGE].summary
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """Plot each leg's velocity in the rigid model from its start and in the contact model from the adjusted start."""
+    """Plot each leg's velocity in walks of the rigid model, from the start, and of the contact model, from the adjusted
+    start."""
     result = results[TUNE_STAGE]
     named = redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
@@ -189,7 +191,7 @@ STATES_IN_TIME = (
 
 
 def draw_states(results: Results) -> Drawn:
-    """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance."""
+    """Plot angle and angular velocity of each leg, in a row each, shaded while the leg is in stance."""
     walks, extent = first_strides(walks_with(results, STATE_VARIABLES))
     first = walks[0]
     figure, axes = plot_over_time(walks, 1.55, STATES_IN_TIME)
@@ -203,11 +205,11 @@ def draw_states(results: Results) -> Drawn:
 
 
 CYCLES = 20
-"""Number of strides shown. Later strides would only overlap, because the transient has ended by then."""
+"""Number of strides to show. The transient has ended by then, so later strides would only overlap."""
 STEPS_PER_STRIDE = 2
 EARLIER_WIDTH = 0.5
 ARROW_LENGTH = 0.06
-"""Length of an arrow on the cycle, as a fraction of the samples of a swing or stance."""
+"""Length of an arrow on the cycle, as a fraction of the number of samples in a swing or stance."""
 
 
 def draw_cycles(results: Results) -> Drawn:
@@ -233,7 +235,8 @@ def draw_cycles(results: Results) -> Drawn:
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Plot the last stride in the model's style, with earlier strides as thin lines behind it."""
-    # Markers show the state just before a heel strike. They are filled if this leg strikes, open if the other one does.
+    # Markers show the state just before a heel strike. They are filled if this leg strikes, and open if the other one
+    # does.
     angle = walk["angle"][:, leg]
     velocity = walk["velocity"][:, leg]
     look = walk.look
@@ -270,14 +273,15 @@ ENERGIES_IN_TIME = (
     ("mechanical_J", "energy", None, "(c) mechanical energy"),
 )
 SMALLEST_SPAN = 0.005
-"""Minimum span of the mechanical-energy axis relative to the energy, so that a constant energy looks constant."""
+"""Minimum span of the axis of the mechanical energy, relative to the energy, so that a constant energy looks
+constant."""
 RANGE_MARGIN = 0.08
 TRIMMED_SHARE = 0.005
-"""Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""
+"""Fraction of the samples, at each end of the range, that does not set the scale, because they lie in impacts."""
 
 
 def draw_energies(results: Results) -> Drawn:
-    """Plot kinetic, potential and mechanical energy over time, a row each."""
+    """Plot kinetic, potential and mechanical energy over time, in a row each."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = plot_over_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (TRIMMED_SHARE, 1.0 - TRIMMED_SHARE)) for walk in walks])
@@ -312,7 +316,8 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 def draw_runs(
     first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]
 ) -> list[bytes] | None:
-    """Draw two runs' walks overlaid, as SVG and PNG, or return None if they share no sampled walk."""
+    """Draw the walks of two runs overlaid, as SVG and PNG, or return None if no stage has sampled walks in both
+    runs."""
     both = [
         (stage, [run[stage].groups["trajectory"] for run in (first, second)])
         for stage in (RIGID_STAGE, CONTACT_STAGE)
@@ -325,7 +330,8 @@ def draw_runs(
 
 
 def draw_overlay(both: list[tuple[str, list[Group]]], names: tuple[str, str]) -> Figure:
-    """Plot a column per stage with both runs' trajectories: a row for each leg's angle, and one for the energy."""
+    """Plot the trajectories of both runs in a column for each stage, with rows for the angles of the legs and the
+    energy."""
     rows, columns = len(OVERLAY_ROWS), len(both)
     figure, axes = panels(0.5 + 1.9 * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for row, (variable, leg, label) in zip(axes, OVERLAY_ROWS, strict=True):

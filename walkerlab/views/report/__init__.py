@@ -1,1 +1,1 @@
-"""The report: HTML pages made from stored results alone, with their sections, tables and templates."""
+"""The report: HTML pages, made only from stored results, with sections, tables and templates."""

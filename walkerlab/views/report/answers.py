@@ -1,4 +1,4 @@
-"""Terminal answers: for each stage a headline, then tables with symbols, units and significant digits.
+"""Build the answer that a terminal shows for each stage: a headline, then tables with symbols, units and digits.
 
 Each answer imports the page sections that it needs, so that other commands start faster.
 """
@@ -39,19 +39,20 @@ FIRST_VALUES = 4
 LAST_VALUES = 6
 """Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
-"""A sentence lists the periods of a cycle only if it has at most this many steps."""
+"""Maximum number of steps of a cycle whose periods a sentence lists."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """Return lines that summarise a stage's result. For a stage that is not in `ANSWERS`, list the summary's keys."""
+    """Return lines that summarise the result of a stage. If the stage is not in `ANSWERS`, they list the summary's
+    keys."""
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
 
 
 def answer_html(stage: str, summary: Summary) -> str:
-    """Return the answer as HTML. For a stage that is not in `ANSWERS`, the lines are kept as they are."""
-    # Imported here: terminals need no templates.
+    """Return the answer as HTML. If the stage is not in `ANSWERS`, show its lines as they are."""
+    # Imported here, because terminals need no templates.
     from walkerlab.views.report.page import environment, to_markup
 
     if stage not in ANSWERS:
@@ -67,7 +68,7 @@ def answer_html(stage: str, summary: Summary) -> str:
 
 
 def further_tables(stage: str, summary: Summary) -> list[str]:
-    """Return the lines that `--verbose` adds to an answer, or none if the answer is complete."""
+    """Return the lines that `--verbose` adds to an answer, or [] if the answer is complete without it."""
     if stage != "robustness" or not summary:
         return []
     from walkerlab.views.report.sections import robustness
@@ -162,7 +163,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """Format the quantities of the steps shown, by step number. '…' stands for the middle of a long walk."""
+    """Format quantities of steps, by the number of the step. '…' stands for the middle of a long walk."""
     from walkerlab.views.report.sections.walks import format_step
 
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}
@@ -222,7 +223,8 @@ LAST_STEP = (
 
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
-    """Compare the last step of each model, the gait's step and, for knees, the last step for each release instant."""
+    """Tabulate the last step of each model, the step of the gait and, if there are knees, the last step for each
+    instant of release."""
     steps = []
     for name, step in summary["steps"].items():
         known_errors = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}
@@ -272,7 +274,7 @@ def best_walker(summary: Summary) -> list[str | Table]:
 
 
 def config_lines(summary: Summary) -> list[str]:
-    """Return lines that name the config that a stage wrote, and the next command."""
+    """Return lines that name the config file that a stage wrote, and the command to try next."""
     file = summary.get("config")
     return [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
 

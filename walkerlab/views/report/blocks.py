@@ -1,4 +1,4 @@
-"""Blocks and sections of the page, and the stored results that sections are made from."""
+"""Blocks and sections of the page, and the stored results from which sections are made."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,7 +24,7 @@ COSTS = "report-accuracy.html"
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Running text. Its tone marks a statement or a placeholder for a pending result."""
+    """Running text. The tone marks a statement, or a placeholder for a pending result."""
 
     text: str
     tone: Tone | Literal["waiting"] = "plain"
@@ -45,9 +45,9 @@ class Statements:
 class Statement:
     """A statement about a subject, with an optional verdict."""
 
-    about: str  # subject, set bold
+    about: str  # subject, in bold type
     text: str
-    badge: str = ""  # verdict in a word, or empty
+    badge: str = ""  # one-word verdict, or empty
     tone: Tone = "plain"
 
 
@@ -77,7 +77,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures in columns. A click enlarges one."""
+    """Figures in columns. A click on a figure enlarges it."""
 
     pictures: tuple[Picture, ...]
 
@@ -119,7 +119,7 @@ class Walker:
     style: str
     track: Track  # thinned motion
     strikes: tuple[float, ...]  # times of the heel strikes (s)
-    # postures, each a line through the joints: mm along the slope, and mm normal to it (down is positive)
+    # postures, each a line through the joints, in mm along the slope and mm normal to it (positive downward)
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""  # how the walk failed, in words; empty if it did not
     pushes: bool = False  # whether the trailing foot pushes off as the other foot lands
@@ -137,7 +137,7 @@ class Walker:
 
 @dataclass(frozen=True)
 class Player:
-    """The animated walk, shown as stills in print and without scripts."""
+    """The animated walk. In print and without scripts, the page shows stills."""
 
     title: str
     caption: str
@@ -149,7 +149,7 @@ class Player:
     closeup_m: float  # height of the close-up of a foot
     view: tuple[int, int, int, int]  # left, top, width and height of the stills (mm, y down), after the slope is tilted
     torso_m: float = 0.0
-    ordinary_force: float = 1.0  # force (N) whose arrow has the standard length
+    ordinary_force: float = 1.0  # force (N) that an arrow of the standard length shows
     pads: tuple[Pad, ...] = ()
     ground: tuple[tuple[float, float], ...] = ()  # start along the slope and height of each ground level (m)
 
@@ -159,7 +159,7 @@ class Player:
 
     @property
     def shows_forces(self) -> bool:
-        """Whether any walker has ground forces. It is also true without walkers, for a player that is filled later."""
+        """Whether any walker has ground forces. Also true of a player without walkers, which is filled later."""
         return not self.walkers or any("n0" in walker.track.channels for walker in self.walkers)
 
     @property
@@ -172,10 +172,10 @@ class Player:
 class GaitMark:
     """A point of a diagram whose gait the player can show."""
 
-    x: float  # position in diagram units, as y
+    x: float  # position in diagram units; likewise y
     y: float
     stable: bool
-    walker: Walker  # motion; its name describes the gait
+    walker: Walker  # motion of the gait, with the gait's description as its name
     slope_rad: float
 
 
@@ -200,7 +200,7 @@ class Diagram:
 
 
 PageBlock = Paragraph | Statements | Shares | Gallery | Cards | Terms | Code | Player | Diagram | Table
-"""A part of a section. Its template in templates/blocks has the name of the class."""
+"""A part of a section. The template of a class is the file of the same name in templates/blocks."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ class Section:
     anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""  # result in brief; if there is one, the section is folded and shows only this text
+    finding: str = ""  # brief result; if there is one, the section is folded and shows only this
     page: str = MAIN  # file of the page
 
     @classmethod
@@ -224,7 +224,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """Results of a run and what is missing, as used by the report."""
+    """Results of a run, and what is missing, as the report uses them."""
 
     config: Config
     stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
@@ -235,13 +235,13 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and the paper's: empty if there are none, None if they were not compared."""
+        """Differences between this scene and the paper's, or None if they were not compared."""
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Values that a study claims for this scene, with verdicts. Empty if no study covers the scene."""
+        """Values that a study claims for this scene, with verdicts, or () if no study covers it."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
@@ -258,8 +258,8 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Make a decorator that passes the summary of a stage to a function. There is no section if the summary is empty
-    or lacks the key `needed`.
+    """Return a decorator for a function that makes a section from the summary of a stage. If the summary is empty or
+    lacks the key `needed`, there is no section.
     """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:

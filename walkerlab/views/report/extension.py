@@ -1,4 +1,4 @@
-"""The stages that draw the figures and the page, after all others."""
+"""The extension with the stages that draw the figures and the page, after all other stages."""
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension

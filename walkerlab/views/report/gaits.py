@@ -1,4 +1,4 @@
-"""Gaits: their values and multipliers, and the section that lists all gaits found."""
+"""Tabulate gaits, with values and multipliers, and build the section that lists all gaits."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from walkerlab.views.report.words import legs_differ, words
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-"""Coordinates of a compass. Results of other walkers store the names of their coordinates."""
+"""Coordinates of a compass, for results that do not store the names of the coordinates."""
 LEG_ROLES = {"1": "swing", "2": "stance"}
 """Role of each leg in the step that begins in a gait's state."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
@@ -55,7 +55,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         Column("residual of the step map", "residual", partial(numbers.power_of_ten, digits=2)),
     ]
     both = len(sets) > 1
-    # The corrected set needs a label only next to the printed one.
+    # The corrected equations need a label only next to the printed ones.
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
     return side_by_side(caption, lines, gaits, note=note)
@@ -72,7 +72,7 @@ def step_value(place: int, key: str, gait: Mapping[str, Any]) -> float:
 
 
 def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield table lines for the period and length of both steps of a gait, and for their asymmetries."""
+    """Yield table lines for period and length of each of the two steps of a gait, and for the asymmetry of both."""
     for index, leg in enumerate(("leg 1", "leg 2")):
         for name, key in (("period", "period_s"), ("length", "length_m")):
             title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
@@ -91,14 +91,14 @@ WORK_ROUNDING = 1e-12
 
 
 def source_work(name: str, record: Mapping[str, Any]) -> float | None:
-    """Return the work of a source, or None if it is at rounding level."""
+    """Return the work of a source, or None if it may be nothing but rounding."""
     work = record.get("work_per_step_J") or {}
     largest = max(map(abs, work.values()), default=0.0)
     return work[name] if abs(work.get(name, 0.0)) > WORK_ROUNDING * largest else None
 
 
 def work_columns(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield a column for the work of each source per step. Values at rounding level are omitted."""
+    """Yield a column for the work of each source per step. Values that may be nothing but rounding are omitted."""
     for name, source in WORK_SOURCES.items():
         yield Column(f"work of {source} per step (J)", partial(source_work, name), written)
 
@@ -108,7 +108,7 @@ def state_at(place: int, gait: Mapping[str, Any]) -> float:
 
 
 def coordinate(name: str) -> str:
-    """Label a coordinate just after heel strike: 'theta_1' is 'θ₁, swing leg (rad)'."""
+    """Return the label of a coordinate just after heel strike, such as 'θ₁, swing leg (rad)' for 'theta_1'."""
     unit = "rad/s" if name.startswith("d") else "rad"
     match = COORDINATE_NAME.fullmatch(name)
     role = LEG_ROLES.get(match["index"] or "") if match else None
@@ -119,7 +119,7 @@ def coordinate(name: str) -> str:
 
 
 def symbol(name: str) -> str:
-    """Return a coordinate's symbol and its body: 'dtheta_1_shank' becomes 'θ̇₁, shank'."""
+    """Return symbol and body of a coordinate, such as 'θ̇₁, shank' for 'dtheta_1_shank'."""
     match = COORDINATE_NAME.fullmatch(name)
     if match is None:
         return name
@@ -158,7 +158,8 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def tabulate_gaits(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
-    """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
+    """Tabulate all gaits by set of equations. Remarks mark the chosen gait, and say why other gaits are not
+    physical."""
     four = partial(numbers.fixed, decimals=4)
     five = partial(numbers.fixed, decimals=5)
     columns = (

@@ -1,4 +1,4 @@
-"""Formats of numbers and symbols in the report."""
+"""Format numbers and symbols for the report."""
 
 import math
 import re
@@ -42,7 +42,7 @@ RULES = (
     (re.compile(r"\+-"), lambda _: "±"),
     (re.compile(r"(?<![\w)\]-])-(?=[\w.(])|(?<= )-(?= )"), lambda _: "−"),
 )
-"""Patterns and replacements, applied in this order."""
+"""Patterns and their replacements, which are applied in this order."""
 
 
 def typeset(text: str) -> str:
@@ -57,10 +57,11 @@ NONE = "–"
 SPACE = "\u00a0"
 """No-break space between a number and its unit."""
 MIN_LENGTH_M = 1e-9
-"""Shorter lengths count as zero. Walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
+"""Length below which a length counts as zero. Walkers are centimetres to metres tall, and walks accurate to 1e-10 of
+it."""
 PLAIN_FROM = 1e-4
 PLAIN_BELOW = 1e6
-"""Range of magnitudes written without a power of ten."""
+"""Range of magnitudes that are written without a power of ten."""
 MAX_DECIMALS = 6
 """Maximum number of decimals of step periods (s) and lengths (m)."""
 DEFAULT_DECIMALS = 4
@@ -87,7 +88,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_left(error: float | None) -> int:
-    """Return the largest number of decimals for which the error is at most half a unit of the last one."""
+    """Return the largest number of decimals such that the error is at most half a unit of the last one."""
     if error is None:
         return DEFAULT_DECIMALS
     return max(0, min(MAX_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MAX_DECIMALS
@@ -102,13 +103,13 @@ def power_of_ten(value: float, digits: int = 3) -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 5) -> str:
-    """Format a value with its unit, as in 0.70365 s, without a line break."""
+    """Format a value with its unit, as in 0.70365 s, so that no line breaks between the two."""
     text = number(value, digits)
     return text if text == NONE or unit in ("", "1") else f"{text}{SPACE}{unit}"
 
 
 def drop_rounding(value_m: float) -> float:
-    """Return a length (m), or zero if it is at the level of rounding and solver tolerance."""
+    """Return a length (m), or zero if it may be nothing but rounding or the error of the solver."""
     return value_m if abs(value_m) >= MIN_LENGTH_M else 0.0
 
 
@@ -131,7 +132,7 @@ def format_integer(value: int | None) -> str:
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
-    """Format a range as 'minimum to maximum' with its unit, or equal ends as one value."""
+    """Format a range as 'minimum to maximum' with its unit, or as one value if the ends are equal."""
     ordered = sorted(values)
     if not ordered:
         return NONE

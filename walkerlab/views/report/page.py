@@ -1,4 +1,5 @@
-"""Pages of the report from templates, with figures embedded as SVG in colours that a page can change, or as PNG."""
+"""Render pages of the report from templates. Figures are embedded as SVG, whose colours a page can change, or as
+PNG."""
 
 import base64
 import hashlib
@@ -21,12 +22,12 @@ from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture, Section
 from walkerlab.views.report.numbers import CARET, POWER, power, to_superscript
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
-"""Page of each figure by the first part of its name. All other figures are on the main page."""
+"""Page of a figure by the first part of the figure's name. All other figures are on the main page."""
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
-    """Embed every figure listed by `plot`, in its order.
+    """Embed every figure that `plot` lists, in the same order.
 
     Raises FileNotFoundError if a listed file does not exist.
     """
@@ -36,7 +37,7 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
 
 
 def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = True) -> Picture:
-    """Embed a figure's file of this kind: SVG inline, PNG as an image.
+    """Embed the file of a figure: SVG inline, PNG as an image.
 
     Raises FileNotFoundError if it does not exist.
     """
@@ -44,7 +45,7 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
     with svg.open("rb") as file:
         # The attribute is in the root element, at the beginning of the file.
         box = VIEW_BOX.search(file.read(2000))
-    # The size in CSS pixels reserves space while the page loads. It is 0 if unknown.
+    # The size in CSS pixels reserves space while the page loads. An unknown size is 0.
     width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
     number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
     title = f"{number}{figure['title']}."
@@ -83,7 +84,7 @@ def choose_images(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) 
         if sum(sizes) <= most:
             break
         png = drawings[index][1]
-        # A drawing with little in it is smaller as SVG.
+        # The SVG of a simple drawing is smaller than its PNG.
         if png.stat().st_size < sizes[index]:
             chosen[index], sizes[index] = png, png.stat().st_size
     return chosen
@@ -95,7 +96,7 @@ SVG_ELEMENTS = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}
 )
-"""Elements and attributes that are copied. None of them runs or loads anything."""
+"""Elements and attributes that may be copied, because none of them runs or loads anything."""
 ATTRIBUTES = frozenset(
     {"viewBox", "d", "x", "y", "x1", "y1", "x2", "y2", "cx", "cy", "r", "width", "height", "points", "transform"}
     | {"style", "id", "clip-path", "preserveAspectRatio", "patternUnits", "fill", "stroke"}
@@ -126,7 +127,8 @@ def inline(file: Path, alt: str) -> Markup:
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
     references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
-    # Ids that nothing refers to could clash with those of other drawings on the page.
+    # Only ids that something refers to are kept, because the others could clash with those of other drawings on the
+    # page.
     used = {value.removeprefix("url(").strip("#)") for value in references}
     inside = Markup("").join(markup(child, used) for child in root)
     box = root.get("viewBox", "0 0 1 1")
@@ -134,7 +136,8 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """Copy an allowed element with its children, keeping only ids in `used`, and return nothing for other elements."""
+    """Copy an element and its children, with only the ids in `used`, or return an empty text if the element is not
+    allowed."""
     name = element.tag.removeprefix(SVG)
     if name not in SVG_ELEMENTS:
         return Markup("")
@@ -153,7 +156,7 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
 
 
 def text_content(text: str | None, name: str) -> Markup:
-    """Escape the text of a text element, and return nothing for other elements."""
+    """Escape the text of a text element, or return an empty text for another element."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
@@ -186,8 +189,8 @@ class Page:
     sections: tuple[Section, ...]
     lead: tuple[str, ...] = ()  # paragraphs under the title
     file: str = MAIN
-    study: Source | None = None  # the study reproduced, or None
-    relation: str = "Redoes"  # first word of the line about the study: Redoes, or After if the scene differs
+    study: Source | None = None  # the study that the run reproduces, or None
+    relation: str = "Redoes"  # first word of the line about the study, or After if the scene is not the study's
     pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
     run: str = ""  # name of the run for suggested commands; empty for the default run
 
@@ -201,13 +204,13 @@ def render(page: Page) -> str:
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
-    # Only the package's own files are markup. All other texts are escaped.
+    # Only files of this package count as markup. All other texts are escaped.
     trusted = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
     return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **trusted)
 
 
 def digest_of(script: str) -> str:
-    """Return the hash by which the page's content security policy recognises the script of the page."""
+    """Return the hash by which the content security policy of a page recognises the script of the page."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
@@ -226,12 +229,12 @@ def environment(run: str = "") -> Environment:
 
 
 def to_markup(text: str) -> Markup:
-    """Convert a text to markup, with backticks as code elements and powers of ten in a single notation."""
+    """Convert a text to markup. Text in backticks becomes code, and all powers of ten get the same notation."""
     parts = [escape(CARET.sub(to_superscript, POWER.sub(power, part))) for part in CODE_SPAN.split(text)]
     parts[1::2] = [Markup("<code>%s</code>") % code for code in CODE_SPAN.findall(text)]
     return Markup("").join(parts)
 
 
 def source(name: str) -> str:
-    """Read a file to embed in the page, leaving out comment lines."""
+    """Read a file to embed in the page, without its comment lines."""
     return COMMENT_LINE.sub("", (TEMPLATE_FOLDER / name).read_text(encoding="utf-8")).strip()

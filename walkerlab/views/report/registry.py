@@ -26,7 +26,7 @@ from walkerlab.views.report.words import words
 
 
 def added_sections(slot: str) -> tuple[SectionMaker, ...]:
-    """Return the sections that extensions add at a place of the page."""
+    """Return the functions that build the sections that extensions add at a position (`SLOTS`) of the page."""
     makers = (maker for extension in extensions().values() for maker in extension.sections.get(slot, ()))
     return tuple(map(load, makers))
 
@@ -59,7 +59,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
 
 
 def pages_of(results: Results, run: str) -> tuple[Page, ...]:
-    """Build the report and the further pages that have content. `run` is the name of the run's folder."""
+    """Build the report, and each further page that has content. `run` is the name of the run's folder."""
     sections = sections_of(results)
     main = [section for section in sections if section.page == MAIN]
     further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}

@@ -1,4 +1,4 @@
-"""The `report` stage: HTML pages of all available results."""
+"""The `report` stage: write HTML pages of all available results."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -41,11 +41,11 @@ def run(
 def write_pages(
     config: Config, inputs: Mapping[str, Stored], folder: Path, left_out: Sequence[LeftOut] = ()
 ) -> tuple[tuple[Page, ...], Results]:
-    """Write pages of the available results, and remove pages that have no content.
+    """Write the pages for which there are results, and remove those that have no content any more.
 
     Raises StorageError if a page cannot be stored or removed.
     """
-    # This is also called while other stages are running and when the command is stopped, with results still pending.
+    # Results are pending if this is called while other stages are running, or after the command was stopped.
     pending = tuple(entry for entry in left_out if entry.why in (STILL_COMPUTED, STOPPED))
     absent = tuple(entry for entry in left_out if entry not in pending)
     names = {entry.what for entry in absent}
@@ -62,7 +62,7 @@ def write_pages(
 
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
-    """Whether a stage itself ran and failed, instead of only lacking the result of another stage."""
+    """Whether a stage ran and failed, rather than lacking the result of another stage."""
     if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
         return False
     return left_out.isdisjoint(PIPELINE[name].inputs(config))

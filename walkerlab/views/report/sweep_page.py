@@ -58,9 +58,10 @@ def check_quantities(group: content.Group, names: Sequence[str], option: str = "
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity. `names` has the quantities by option, as in '--show speed_m_s'.
+    """Raise ConfigError for an unknown quantity. `names` maps options as typed, such as '--show speed_m_s', to
+    quantities.
 
-    A quantity in a block of the summary may still appear with a later point, so it is not refused.
+    A quantity in a block of the summary is not refused, because it may still appear with a later point.
     """
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():

@@ -1,4 +1,4 @@
-"""Tables, described once by columns and records, for pages, terminal and CSV, and summaries as text."""
+"""Tables, declared once by columns and records, for pages, terminal and CSV, and summaries as text."""
 
 import re
 import textwrap
@@ -25,12 +25,13 @@ class Cell:
     """A cell of a table."""
 
     text: str
-    tone: Tone | None = None  # if set, the text is a badge of this tone
-    value: Any = None  # value behind the text, or None
+    tone: Tone | None = None  # if given, the text is shown as a badge of this tone
+    value: Any = None  # value that the text shows, or None
 
     @property
     def datum(self) -> Any:
-        """Value of the cell in a file: the number behind the text, otherwise the text, or None if it is empty."""
+        """Content of the cell in a file: the value that the text shows or, without one, the text, or None if that is
+        empty."""
         if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
             return self.value
         plain = self.value if isinstance(self.value, str) else self.text
@@ -45,15 +46,15 @@ def format_plain(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """Describes how to show one value of each record, as a column or, in `side_by_side`, as a row."""
+    """Declares how to show one value of each record, in a column or, with `side_by_side`, in a row."""
 
     title: str  # header, with the unit
     # key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows of cells
     of: str | Callable[[Any], Any] | None = None
-    # formats a value as text or as a cell with a tone; values that are already cells are kept
+    # formats a value as text, or as a cell with a tone; a value that is a cell is kept as it is
     written: Callable[[Any], str | Cell] = format_plain
     numeric: bool = False  # whether to align as numbers
-    wide: bool = False  # whether cells hold sentences; tables on a terminal leave out such columns
+    wide: bool = False  # whether cells hold sentences; a terminal does not show such columns
 
     def value(self, record: Any, place: int = 0) -> Any:
         if self.of is None:
@@ -74,7 +75,8 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """Return a column of numbers in a unit scaled by `prefix`. The unit comes from `labels` or the key's suffix."""
+    """Return a column of numbers in a unit with a `prefix`, such as m. The unit comes from `labels` or the key's
+    suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
 
@@ -94,7 +96,7 @@ class Table:
     groups: Mapping[str, Sequence[Sequence[Cell]]]  # rows by group title; the title may be empty
     wordy: bool = False  # whether cells hold sentences; on a narrow screen each row then becomes a card
     note: str = ""  # text below the table
-    by: str = ""  # header of the column of group titles
+    by: str = ""  # header of the column with the titles of groups, if tables are flat
 
     def __bool__(self) -> bool:
         return any(self.groups.values())
@@ -109,7 +111,7 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """Build a table with a row per record. A mapping gives groups by title.
+    """Build a table with a row for each record. If `records` is a mapping, its keys are titles of groups.
 
     Raises ValueError for rows of the wrong length.
     """
@@ -125,7 +127,7 @@ def table(
 
 
 def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Group records that have the same values of some keys, in order of first appearance."""
+    """Group records by their values of some keys, in the order in which groups first appear."""
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         groups.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
@@ -141,7 +143,8 @@ def side_by_side(
     numeric: bool = True,
     note: str = "",
 ) -> Table:
-    """Build a table with a column per record and a row per entry of `lines`. Rows without any value are left out."""
+    """Build a table with a column for each record and a row for each entry of `lines`. Rows without a value are left
+    out."""
     rows = []
     for line in lines:
         cells = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
@@ -164,7 +167,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
 
 
 def flatten(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Return header and rows, with group titles, if any, in a first column. `wide` includes columns of sentences."""
+    """Return header and rows. Titles of groups, if any, are in a first column. `wide` includes columns of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
     heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]
@@ -204,13 +207,13 @@ INDENT = "  "
 PARAGRAPH_WIDTH = 100
 """Line width of a paragraph (characters)."""
 LONGEST_ROW = 12
-"""Length of the longest row that is shown in full."""
+"""Maximum number of values of a row that is shown in full."""
 ENDS = 4
 """Number of values shown at each end of a longer row."""
 
 
 def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
-    """Yield a line per key, nested values below it, and a table for a list of objects. `short` shortens long rows."""
+    """Yield a line for each key, then nested values or, for a list of objects, a table. `short` shortens long rows."""
     widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:
@@ -224,7 +227,7 @@ def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bo
 
 
 def cut(value: Any) -> Any:
-    """Leave out the middle of a long row, and return other values unchanged."""
+    """Replace the middle of a long row by a note, and return any other value unchanged."""
     if not isinstance(value, list) or len(value) <= LONGEST_ROW:
         return value
     ends = [format_value(item) for item in (*value[:ENDS], *value[-ENDS:])]
@@ -232,7 +235,8 @@ def cut(value: Any) -> Any:
 
 
 def record_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Tabulate objects with their keys as headers, and name the keys whose columns are too wide."""
+    """Tabulate objects, with keys as headers, and name the keys that are left out because their columns are too
+    wide."""
     cells = record_table(rows, format_value)
     long = [column.title for column in cells.columns if column.wide]
     return [*table_lines(cells), f"with --json also: {', '.join(long)}"] if long else table_lines(cells)

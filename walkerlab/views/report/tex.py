@@ -1,4 +1,4 @@
-"""Tables for LaTeX: aligned decimals, equal digits per column, headers and captions with symbols."""
+"""Format tables for LaTeX: aligned decimals, equal digits in a column, headers and captions with symbols."""
 
 import math
 import re
@@ -12,16 +12,16 @@ from walkerlab.views.report.tables import Table, flatten
 COLUMN_DIGITS: Final = 5
 """Significant digits of the largest number in a column or, if the numbers differ too much in size, of each number."""
 MAX_PLAIN: Final = 1e6
-"""Magnitude from which numbers are written with a power of ten."""
+"""Magnitude from which on numbers are written with a power of ten."""
 EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, graphicx, siunitx}"
 WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
 SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
 """Start of a box that is at most as wide as the text around it."""
 MIN_HEAD: Final = 10
-"""Number of characters of a column's head that always stay on one line."""
+"""Number of characters of a column's head that always fit on one line."""
 MAX_UNWRAPPED: Final = 28
-"""Number of characters of a text cell above which its column is wrapped."""
+"""Number of characters of a cell above which the column is wrapped."""
 WRAPPED: Final = r">{\raggedright\arraybackslash}p{11em}"
 TYPE_SIZES: Final = {"": 1.0, r"\small": 0.9, r"\footnotesize": 0.8, r"\scriptsize": 0.7}
 CHARACTER_PT: Final = 5.0
@@ -53,7 +53,7 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 
 
 def as_tex(content: Table, columns: int = 1) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption. Columns of sentences are left out.
+    """Format a table, without columns of sentences, for booktabs and siunitx. If it has a caption, it becomes a float.
 
     columns  journal columns that the table spans, which determine the size of its type
     """
@@ -73,7 +73,7 @@ def as_tex(content: Table, columns: int = 1) -> bytes:
 
 
 def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
-    """Choose the largest type in which a table's columns probably fit into this number of journal columns."""
+    """Choose the largest type in which the cells of a table probably fit into this number of journal columns."""
     characters = (min(max(map(len, column)), MAX_UNWRAPPED) for column in cells)
     width = sum(CHARACTER_PT * count + 6.0 for count in characters)
     fitting = (size for size, scale in TYPE_SIZES.items() if scale * width <= COLUMN_WIDTHS[columns])
@@ -81,7 +81,8 @@ def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
 
 
 def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return the lines of each column's head. Its words are wrapped to the column, and the unit has a separate line."""
+    """Return the lines of the head of each column. Words are wrapped to the column, and a unit has a line of its
+    own."""
     parts = [TITLE.fullmatch(title) for title in titles]
     has_units = any(part and part["unit"] for part in parts)
     heads = []
@@ -98,12 +99,12 @@ def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Seq
 
 
 def format_column(data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Return layout and cells of a column. A numeric column is a siunitx column, aligned at the decimal point."""
+    """Return layout and cells of a column. For numbers, it is a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else escape_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
-    # Text that looks like numbers, such as printed values, counts as numbers if most of the column looks like it.
+    # Texts that look like numbers, such as printed values, count as numbers if most of the column does.
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
         longest, longest_word = (max(map(len, texts), default=0) for texts in (cells, " ".join(cells).split()))
         return WRAPPED if longest_word <= MAX_UNWRAPPED < longest else "l", cells
@@ -121,7 +122,7 @@ def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
     decimals = max(0, COLUMN_DIGITS - 1 - math.floor(math.log10(max(sizes))))
-    # Equal decimals are used only if the smallest number loses at most one digit by that.
+    # Equal decimals are used only if they cost the smallest number at most one digit.
     if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
     return lambda value: "0" if value == 0.0 else format_digits(value)
@@ -140,16 +141,16 @@ def room_for(cells: Sequence[str]) -> str:
 
 
 def escape_tex(value: Any) -> str:
-    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped, and a dash for None."""
+    """Convert a text to LaTeX, with symbols and powers in maths and special characters escaped, or None to a dash."""
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))
-    # Where two formulas touch, `$$` would begin a displayed one.
+    # The `$$` between two formulas that touch is removed, because it would begin a displayed formula.
     return SCRIPTS.sub(join_scripts, SYMBOL.sub(symbol_in_tex, text).replace("$$", ""))
 
 
 def join_scripts(match: re.Match[str]) -> str:
-    """Join superscripts, or subscripts, that follow one another."""
+    """Join superscripts (or subscripts) that follow one another into one."""
     return f"{match[1]}{{{''.join(SCRIPT.findall(match[0]))}}}"
 
 

@@ -1,4 +1,4 @@
-"""Motion data for the page's player: joints, ground forces, slip and energies, thinned in time."""
+"""Motions for the page's player: joints, ground forces, slip and energies, with fewer samples than were stored."""
 
 import base64
 import math
@@ -29,7 +29,7 @@ Channels = dict[str, Array]
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The motion of one walker, an array for each channel."""
+    """The motion of one walker, with an array for each channel."""
 
     # Channels by name, all of the same length. A final digit is the index of the leg.
     # t           time (s)
@@ -51,7 +51,7 @@ class Track:
         return float(self["t"][-1])
 
     def cut(self, time: float) -> "Track":
-        """Return the part up to a time (s)."""
+        """Return the part of the motion up to a time (s)."""
         inside = self["t"] <= time + 1e-9
         return Track({name: values[inside] for name, values in self.channels.items()})
 
@@ -60,7 +60,7 @@ class Track:
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
-        # At a heel strike two samples have the same time: before and after it.
+        # A heel strike has two samples with the same time, before and after it.
         jumps = np.flatnonzero(np.diff(time) <= 0.0)
         samples = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}
         if "n0" in self.channels:
@@ -94,7 +94,7 @@ def track_in(trajectory: Group | None) -> Track | None:
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
-    """Integrate how far a foot has slipped since it last touched down (m). It is zero in the air."""
+    """Return how far (m) a foot has slipped since it last touched down, or zero while the foot is in the air."""
     sliding = np.where(touching, velocity, 0.0)
     way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
     begins = touching & ~np.concatenate(([False], touching[:-1]))
@@ -103,5 +103,6 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Return the time between samples (s), in proportion to the leg's pendulum time: small walkers move faster."""
+    """Return the time between samples (s), in proportion to the leg's pendulum time, because small walkers move
+    faster."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

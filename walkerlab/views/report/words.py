@@ -1,4 +1,4 @@
-"""Sentences of the report, from a template file for each section, and words for models, outcomes and errors."""
+"""Render the sentences of the report, from a template file for each section, and name models, outcomes and errors."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ WALKED_LABEL = Outcome.WALKED.label
 
 
 def ends(outcome: str) -> str:
-    """Describe how a walk ends. An outcome unknown to this version keeps its name."""
+    """Describe how a walk ends, or return the name of an outcome that this version does not know."""
     ending = outcome_of(outcome)
     return f"ends as {outcome}" if ending is None else OUTCOME_TEXTS[ending].does
 
@@ -51,7 +51,7 @@ ERROR_TEXTS = {
 
 
 MAX_LAST_ERROR_RATIO = 0.01
-"""The answer also gives the error of the last step if it is less than this fraction of the largest one."""
+"""Fraction of the largest error below which the answer also gives the error of the last step."""
 
 
 def describe_error(error: Mapping[str, Any]) -> str:
@@ -68,12 +68,12 @@ def describe_error(error: Mapping[str, Any]) -> str:
 
 
 def legs_differ(gait: Mapping[str, Any]) -> bool:
-    """Whether a gait is that of a walker with different legs. Then only its strides have multipliers, not its steps."""
+    """Whether the legs of a gait's walker differ. Multipliers are then those of a stride, not of a step."""
     return "gait_steps" in gait and "multipliers" not in gait
 
 
 def describe_limp(gait: Mapping[str, Any]) -> str:
-    """Continue a sentence that ends in a multiplier with the difference between both legs' steps, if they differ."""
+    """Return the end of a sentence about a multiplier: how the steps of the two legs differ, or '' if they do not."""
     if not legs_differ(gait):
         return ""
     period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))
@@ -84,7 +84,7 @@ def describe_limp(gait: Mapping[str, Any]) -> str:
 
 
 def compare(asymmetry: float, more: str, less: str) -> str:
-    """Describe a second value relative to the first, as '5.3 % more', from their difference divided by their mean."""
+    """Compare a second value with a first, as '5.3 % more'. `asymmetry` is their difference divided by their mean."""
     percent = 100.0 * ((2.0 + asymmetry) / (2.0 - asymmetry) - 1.0)
     return f"{number(abs(percent), 2)} % {more if percent > 0.0 else less}"
 
@@ -99,6 +99,6 @@ TEMPLATE_FUNCTIONS = (
     *(numbers.count, join_words, numbers.power_of_ten, join_row, typeset, ends, walks, describe_error, len),
     *(describe_limp, legs_differ, describe_second_leg),
 )
-"""Functions available to the templates."""
+"""Functions that templates can use."""
 TEMPLATE_CONSTANTS = {"CHANNELS": CHANNELS, "ERRORS": ERROR_TEXTS, "DEFAULT_CHECK": DEFAULT_CHECK}
 words = Prose(Path(__file__).parent / "templates" / "words", TEMPLATE_FUNCTIONS, TEMPLATE_CONSTANTS)

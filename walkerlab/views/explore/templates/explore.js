@@ -44,7 +44,7 @@ function fromFragment() {
   byId("config").value = state.config;
 }
 
-// Called when a slider is released: with every value on the way in the history, the Back button would be useless.
+// Called only when a slider is released, because the Back button would be useless if the history had every value on the way.
 function remember() {
   if (fragment() !== remember.last) history.pushState(null, "", fragment());
   remember.last = fragment();
@@ -89,7 +89,7 @@ function say(text, tone = "plain") {
 }
 
 const asSentence = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
-// Positions in a command line or file mean nothing on a page.
+// The position in a command line or file, with which an error begins, means nothing on a page.
 const withoutPosition = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
 const sentence = ({ message, advice }) => [withoutPosition(message), advice].map(asSentence).join(" ").trim();
 
@@ -259,7 +259,7 @@ class Row {
     if (document.activeElement !== this.text || Number(this.text.value) !== value) this.text.value = text;
     this.written = this.text.value;
   }
-  // Typed text that is not yet entered survives answers that arrive meanwhile.
+  // Keep typed text that is not entered yet, even if an answer arrives meanwhile.
   get edited() {
     return this.text && this.text.value !== this.written;
   }
@@ -304,7 +304,7 @@ function arrange(numbers) {
   document.body.classList.toggle("rigid-only", !rows.has("contact.stiffness"));
   const elements = visible.map((row) => row.root);
   const current = [...byId("sliders").children];
-  // Moving an element ends its drag, so leave the list alone unless it differs.
+  // Moving a slider in the page would end its drag, so leave the list alone unless it differs.
   if (elements.length !== current.length || elements.some((one, index) => one !== current[index])) {
     byId("sliders").replaceChildren(...elements);
     if (focused) byId(focused)?.focus();
@@ -401,7 +401,7 @@ class Along extends Plot {
     this.container.classList.remove("old");
     const quantity = byId("quantity");
     this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, ""];
-    // Gaits far from the stable ones would flatten the others into a line.
+    // If the axis included gaits far from the stable ones, the others would look like a line.
     const typical = [this.height, ...this.gaits.flatMap((curve) => curve[quantity.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
     const [low, high] = typical.length ? [Math.min(...typical) / 1.5, Math.max(...typical) * 1.5] : [0, Infinity];
     const series = this.gaits.flatMap((curve) => {

@@ -1,1 +1,1 @@
-"""The sections of the report, one per file, each built from the available results."""
+"""The sections of the report, a file for each subject. They are built from the available results."""

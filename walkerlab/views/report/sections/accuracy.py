@@ -1,4 +1,4 @@
-"""The cost of accuracy: error against run time for each method."""
+"""Section on the cost of accuracy: error against run time for each method."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -51,8 +51,8 @@ def costs(summary: Row) -> Table:
 
 
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
-    """Yield the methods of a scene, each with its fastest run for each error level and its smallest error."""
-    # Errors below the uncertainty of the reference are known only to be below it.
+    """Yield a row for each method of a scene, with the fastest run for each level of error, and the smallest error."""
+    # Of an error below the uncertainty of the reference, nothing is known but that it is below.
     best = summary["best"].get(scene, {}).values()
     bound = float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():

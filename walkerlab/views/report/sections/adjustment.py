@@ -1,4 +1,4 @@
-"""The paper's parameter adjustment: whether it is needed, how large it is, and what explains it."""
+"""Sections on the paper's parameter adjustment: whether it is needed, how large it is, and what explains it."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -54,7 +54,7 @@ def limit(results: Results) -> Section | None:
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the start before and after the adjustment. If the scene is the paper's, include its Table 2."""
+    """Tabulate the start before and after the adjustment. If the scene is the paper's, include the paper's Table 2."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption = "The start before and after the adjustment"
     note = ""
@@ -77,7 +77,7 @@ LOSS_HEADS = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Label of each energy loss per step, and the text for the rigid model, by stored name."""
+"""Label of each energy loss per step, and what the table shows for the rigid model, by stored name."""
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
@@ -87,7 +87,7 @@ def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
-    """Format multipliers (real, imaginary), with ± for a conjugate pair."""
+    """Format multipliers (real, imaginary) as a list, in which ± stands for a conjugate pair."""
     pairs = ((fixed(real, 4), imag) for real, imag in multipliers if imag >= 0.0)
     return join_words(f"{real} ± {fixed(imag, 4)}i" if imag > 1e-9 else real for real, imag in pairs)
 

@@ -14,7 +14,8 @@ from walkerlab.views.report.words import words
 
 
 def provenance_section(results: Results) -> Section | None:
-    stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # these have a provenance
+    # Other results have no provenance.
+    stored = [result for result in results.stored.values() if isinstance(result, Stored)]
     note = "A key covers config, inputs and code. Equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
@@ -46,7 +47,7 @@ DIGEST_COLUMNS = (
 
 
 def software_table(stored: Sequence[Stored]) -> Table:
-    """Tabulate software versions and platform, in one column unless the results differ."""
+    """Tabulate software versions and platform, in one column if they are the same for all results."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for result in stored:
         origin = result.provenance
@@ -67,7 +68,7 @@ TITLES = {
 
 
 def link_pages(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
-    """Link to the further pages, with the findings of their sections, and announce pending results."""
+    """Link to the further pages with the findings of their sections, and announce pending results."""
     items = []
     for file, sections in pages.items():
         findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
@@ -93,12 +94,12 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield a row for each reason with the results that it affects, then a row with the results that need those.
+    """Yield a row for each reason, with the results that it affects, then a row with the results that need those.
 
     A row has the results, the reason, and what their omission saves.
     """
     reasons = {absent.why for absent in missing}
-    # The last part is the innermost reason: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'.
+    # The actual reason comes last, such as 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'.
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for reason in dict.fromkeys(causes.values()):
         same_reason = [absent for absent in missing if absent.why == reason]

@@ -1,4 +1,4 @@
-"""Families of gaits over a parameter, their bifurcations, an interactive diagram, and basins of attraction."""
+"""Sections on families of gaits, with bifurcations and an interactive diagram, and on basins of attraction."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -52,9 +52,10 @@ def parameter(summary: Mapping[str, Any]) -> str:
 
 DIAGRAM_MODEL = "rigid"
 MIN_MARK_DISTANCE = 16.0
-"""Minimum distance between two marks (diagram units). It is 1.5 times their width, so that a finger can select one."""
+"""Minimum distance between two marks (diagram units), which is 1.5 times their width, so that a finger can select
+one."""
 SAMPLING_MARGIN = 3.0
-"""Sampling interval relative to that of the walks. It is coarser, because these gaits are only viewed."""
+"""Sampling interval, relative to that of the walks. It is larger, because these gaits are only viewed."""
 
 
 class DiagramAxis:
@@ -63,7 +64,7 @@ class DiagramAxis:
     def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
         least = float(values.min())
         most = float(values.max())
-        # If all values are equal, the axis needs some span.
+        # If all values are equal, the axis still needs some span.
         room = 0.04 * (most - least) or 1.0
         self.least = least - room
         self.most = most + room
@@ -140,7 +141,7 @@ def separate_marks(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
 def curves(
     branch: Group, across: DiagramAxis, up: DiagramAxis
 ) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
-    """Yield lines (points, stable): one for each step of the gaits and each stretch of equal stability."""
+    """Yield a line (points, stable) for each step of the gaits and each stretch of equal stability."""
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):

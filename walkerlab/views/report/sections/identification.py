@@ -1,4 +1,4 @@
-"""Parameters identified from a measured walk, and measurements that would determine them."""
+"""Sections on parameters identified from a measured walk, and on measurements that would determine them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,9 +13,9 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 NO_EFFECT = 1e-6
-"""Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
+"""Fraction of the largest singular value below which a combination of parameters counts as without effect on walks."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
-NOTABLE_CHANGE = 0.5  # change of an estimate (standard errors) that is reported, if a fixed parameter is 1 % larger
+NOTABLE_CHANGE = 0.5  # smallest reported change of an estimate (standard errors) for a 1 % larger fixed parameter
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
@@ -143,7 +143,7 @@ def rounded(value: float, error: float | None) -> str:
 
 
 def decimals_of(error: float) -> int:
-    """Return the number of decimals that shows one digit of an error, or two if its first digit is 1."""
+    """Return the number of decimals that shows one digit of an error, or two digits if the first is 1."""
     mantissa, _, exponent = f"{error:.1e}".partition("e")
     return max(0, -int(exponent) + (mantissa < "2"))
 
@@ -168,7 +168,7 @@ def describe_mass(key: str, text: str, leg: str = BOTH_LEGS) -> str:
 
 
 def describe_limp_of_legs(summary: Mapping[str, Any]) -> list[str]:
-    """Return sentences about the legs' differences, if any is clear, and about the leg that swings first."""
+    """Return sentences about differences between the legs, if any is clear, and about the leg that swings first."""
     rows, others = summary.get("leg_differences", []), summary.get("other_leg_differences", [])
     if not any(abs(row["value"]) > CONTRADICTION * row["standard_error"] for row in rows):
         return []
@@ -198,17 +198,17 @@ def describe_estimate(row: Mapping[str, Any], leg: str = BOTH_LEGS) -> str:
 
 
 def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
-    """Describe how estimates change if the most influential fixed parameter is off."""
+    """Describe how estimates change if the fixed parameter with the most influence is off."""
     change = quantity(held["change"], unit_by_name(held["to"]), 2)
     units = [UNITS_IN_WORDS.get(row["unit"], f" {row['unit']}") for row in estimates]
     changes = [
         f"the {axis_label(row['key'])} by {held[row['key']]}{unit}" for row, unit in zip(estimates, units, strict=True)
     ]
-    return f"If {held['to']}, which is held fixed, was {change} larger, this would change {join_words(changes)}."
+    return f"If {held['to']}, which is held fixed, were {change} larger, this would change {join_words(changes)}."
 
 
 def label_combination(combination: str, keys: Sequence[str]) -> str:
-    # A key may be part of a longer one, which is therefore replaced first.
+    # The longest key is replaced first, because it may contain a shorter one.
     for key in sorted(keys, key=len, reverse=True):
         combination = combination.replace(key, axis_label(key))
     return combination
@@ -274,7 +274,8 @@ def plan_section(_results: Results, summary: Mapping[str, Any]) -> Section | Non
 
 
 def plan_findings(summary: Mapping[str, Any]) -> list[str]:
-    """Return the answer in sentences: the simplest measurement, the steps for each target error, the assumptions."""
+    """Return the answer in sentences: the simplest measurement, the steps for each target error, and the
+    assumptions."""
     rows = summary["measurements"]
     targets = [place for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry]
     return words.parts("plan.findings", summary, [goal(rows, place, summary["max_steps"]) for place in targets])

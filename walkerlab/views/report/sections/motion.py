@@ -1,4 +1,5 @@
-"""Animated walks with a close-up of a foot and three synchronised plots, and the section of figures."""
+"""Build the player of animated walks, with the close-up of a foot and three synchronised plots, and the section of
+figures."""
 
 import math
 from typing import Any
@@ -16,9 +17,9 @@ MAX_SHOWN_STEPS = 10
 WALKER_STYLES = {RIGID_STAGE: "rigid", CONTACT_STAGE: "contact"}
 OVERLAY_STYLES = {"identified": "rigid", "measured": "contact"}
 CLOSEUP_DEPTHS = 5.0
-"""Height of the close-up relative to the largest penetration outside impacts."""
+"""Height of the close-up, relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
-"""Height of the close-up if feet do not sink in (leg lengths)."""
+"""Height of the close-up (leg lengths) if feet do not sink in."""
 
 
 def section(results: Results) -> Section | None:
@@ -26,7 +27,7 @@ def section(results: Results) -> Section | None:
 
 
 def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
-    """Animate the first steps of both models' walks, or return None if no motion was stored."""
+    """Animate the first steps of the walks of both models, or return None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
     # The animation ends when the slower model has taken `most` steps.
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
@@ -83,7 +84,7 @@ def overlay(results: Results) -> Player | None:
 
 def walker(results: Results, stage: str, track: Track) -> Walker:
     summary = results.summary(stage)
-    # Rounding must not drop the strike at which the track was cut.
+    # The strike at which the track was cut must not be dropped because of rounding.
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     return Walker(
         name=MODEL_NAMES[stage],
@@ -97,9 +98,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
 
 
 def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Return the postures of the still picture, at heel strikes and mid-step. Each is a line from foot to foot (mm, y
-    down).
-    """
+    """Return postures for stills, at heel strikes and in mid-step. Each is a line from foot to foot (mm, y down)."""
     times: Any = np.array([0.0, *strikes])
     instants = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], instants), 0, track["t"].size - 1)
@@ -113,7 +112,7 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
 
 
 def weight(tracks: dict[str, Track]) -> float:
-    """Return a typical ground force (N) to scale arrows by, or 1 if forces are unknown."""
+    """Return a typical ground force (N) by which to scale arrows, or 1 if no forces were stored."""
     loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
     return max((load for load in loads if load > 0.0), default=1.0)
 

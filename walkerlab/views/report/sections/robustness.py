@@ -1,4 +1,4 @@
-"""Disturbances that a gait survives, and the parameters that matter most."""
+"""Section on the disturbances that a gait survives, and the parameters that matter most."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,7 +17,7 @@ MAX_DERIVATIVES = 12
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity that ranks the parameters. It is dimensionless, because a norm in s/m depends on the walker's size."""
+"""Quantity that ranks the parameters. It is dimensionless, because a norm in s/m would depend on the walker's size."""
 MODEL_COLUMN = Column("model", "model")
 LEG_COLUMN = Column("swing leg", "leg")
 NORM_COLUMNS = (
@@ -79,7 +79,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 
 
 def is_worse(row: Mapping[str, Any]) -> bool:
-    """Whether a gait is less robust at the optimum than at the start: it survives less, or is more sensitive."""
+    """Whether the gait at the optimum survives less than that at the start of the search, or is more sensitive."""
     change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
     return (change if row["quantity"].startswith("largest") else -change) < -MIN_DECLINE
 

@@ -1,4 +1,4 @@
-"""The verdict on a run and on the values of a study, and the differences between both models."""
+"""The verdict on a run and on the values of a study, and the section on differences between the two models."""
 
 import math
 from collections import Counter
@@ -52,7 +52,7 @@ def models_section(results: Results) -> Section | None:
 
 
 def departure(results: Results) -> str:
-    """Describe where the contact model departs from the rigid one, or return '' if they were not compared."""
+    """Describe where the contact model differs from the rigid one, or return '' if they were not compared."""
     summary = results.summary("compare")
     if "steps" not in summary or summary["steps"]["contact"]["period_s"] is None:
         return ""
@@ -95,7 +95,8 @@ def failures(results: Results) -> list[str]:
 
 
 def outcome_statements(results: Results) -> Iterator[Statement]:
-    """Yield a statement for each walk (outcome, key numbers, advice), for the gait, and for a failed adjustment."""
+    """Yield a statement for each walk (outcome, important numbers, advice), for the gait, and for an adjustment that
+    failed."""
     for stage, model in MODEL_NAMES.items():
         if summary := results.summary(stage):
             config = results.config
@@ -113,7 +114,8 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """Return the end time of a walk (s) and the hip's height at its end (m), or None for values that are not stored."""
+    """Return the time (s) at which a walk ends and the height (m) of the hip then. A value that is not stored is
+    None."""
     summary = results.summary(stage)
     trajectory = results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:

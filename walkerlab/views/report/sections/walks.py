@@ -1,4 +1,4 @@
-"""The walks: quantities of the contact walk, assumptions of the rigid walk, and the steps of both."""
+"""Sections on the walks: quantities of the contact walk, assumptions of the rigid walk, and the steps of both."""
 
 from collections.abc import Mapping
 from itertools import zip_longest
@@ -51,7 +51,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
 
 
 def joules(value: float, digits: int = 4) -> str:
-    """Format an energy (J) that may be at the level of rounding."""
+    """Format an energy (J), which may be nothing but rounding."""
     return f"{numbers.number(value, digits) if abs(value) >= 1e-3 or value == 0 else numbers.power_of_ten(value, 2)} J"
 
 
@@ -59,7 +59,7 @@ HOLDS = Cell("holds", "good")
 FAILS = Cell("does not hold", "bad")
 NOTED = Cell("does not hold (ignored)", "fair")
 NEGLIGIBLE = 1e-6
-"""Up to this value, a relative energy drift or a scuffing depth (leg lengths) counts as zero."""
+"""Value up to which a relative energy drift, or a scuffing depth (leg lengths), counts as zero."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
     Column("measured", "measured", wide=True),
@@ -101,9 +101,9 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 
 
 HEAD_STEPS = 20
-"""Number of steps listed from the beginning of a longer walk."""
+"""Number of steps at the beginning of a long walk that are listed."""
 TAIL_STEPS = 4
-"""Number of steps listed from the end of a longer walk."""
+"""Number of steps at the end of a long walk that are listed."""
 SERIES = {
     (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
     (CONTACT_STAGE, "step_periods_s"): "contact T (s)",
@@ -111,7 +111,7 @@ SERIES = {
     (CONTACT_STAGE, "step_lengths_m"): "contact S (m)",
     (CONTACT_STAGE, "slips_m"): "slip of the stance foot (mm)",
 }
-"""Titles of the step table's columns, by the stage and key of their values."""
+"""Titles of the columns in the table of steps, by stage and key of their values."""
 
 
 def steps(results: Results) -> Section | None:
@@ -134,7 +134,7 @@ def steps(results: Results) -> Section | None:
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of one step with the decimals that its numerical error allows. Slips are in mm.
+    """Format a quantity of one step (slips in mm) with the decimals that its numerical error allows.
 
     place  index of the step, from 0
     key    key of the quantity in the summary

@@ -53,7 +53,7 @@ class Track {
   }
 }
 
-// A canvas as wide as its container, sharp on every screen.
+// A canvas that is as wide as its container, and sharp on every screen.
 class Picture {
   constructor(canvas, shape) {
     Object.assign(this, { canvas, shape, context: canvas.getContext("2d") });
@@ -83,7 +83,7 @@ function arrow(c, x, y, dx, dy) {
   c.stroke();
 }
 
-// Draw the force on a foot as an arrow: `unit` long for an ordinary force, never longer than `most`.
+// Draw the force on a foot as an arrow, which is `unit` long for an ordinary force and never longer than `most`.
 function force(c, scene, track, leg, x, y, unit, most) {
   const [normal, along] = [track.at(`n${leg}`), track.at(`d${leg}`) ?? 0];
   if (!normal || normal < 0) return;
@@ -149,7 +149,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
 }
 
-// Draw uneven ground a second time, below it, with exaggerated heights and a label with the factor.
+// Draw uneven ground a second time, below the first, with exaggerated heights and a label that shows the factor.
 function drawRelief({ context: c, toPixels, height }, scene, levels, colours) {
   const roughest = Math.max(0, ...scene.ground.map(([, level]) => Math.abs(level)));
   const times = roughest ? niceStep((0.04 * scene.leg_m) / roughest) : 0;
@@ -243,7 +243,7 @@ function clearance(scene, track, leg) {
   return track.at(`fy${leg}`) - levelsOf(scene, x - 1e-9, x + 1e-9)[0][2];
 }
 
-// Draw one foot, with the slope level: its penetration, its slip and the forces.
+// Draw one foot on the slope, as if that were level: penetration, slip and forces.
 function drawFoot(picture, scene, track, leg, colours) {
   const { context: c, width, height } = picture;
   const scale = height / scene.closeup_m;
@@ -515,7 +515,7 @@ function play(root, firstScene, firstTracks) {
   };
   const keys = { " ": "play", ArrowLeft: "frame-back", ArrowRight: "frame-on", PageUp: "step-back", PageDown: "step-on", Home: "first", End: "last" };
   root.addEventListener("keydown", (event) => {
-    // These controls need the key themselves.
+    // These controls use the key themselves.
     const reserved = event.key === " " ? "BUTTON INPUT SELECT" : "SELECT";
     const action = keys[event.key];
     if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -551,7 +551,7 @@ function play(root, firstScene, firstTracks) {
   // The controls are as wide as the figure, which cannot be observed because it has no box of its own on a phone.
   new ResizeObserver(fit).observe(find(".controls"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
-  // Users who prefer reduced motion start at a quarter of the speed.
+  // For users who prefer reduced motion, the walk starts at a quarter of the speed.
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
   change(firstScene, firstTracks);
   fit();
