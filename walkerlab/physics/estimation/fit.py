@@ -45,7 +45,7 @@ NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 # a round ends when the cost or the unknowns change by less than this (relative)
-FIT_TOLERANCE: Final = 1e-4
+FIT_TOLERANCE: Final = 1e-6
 SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # standard deviation of a weak prior on each scaled unknown, which keeps undetermined combinations near the start
