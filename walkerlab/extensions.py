@@ -235,7 +235,7 @@ def refuse_other_versions(expected: str) -> None:
     `versions`)."""
     if expected != versions():
         have = f"this worker has the extensions [{versions()}], and its caller [{expected}]."
-        raise ConfigError(have, "Install the same in both environments; `walkerlab extensions` lists them.")
+        raise ConfigError(have, "Install the same extensions in both environments. `walkerlab extensions` lists them.")
 
 
 def announced() -> Iterator[tuple[str, str, str]]:

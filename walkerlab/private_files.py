@@ -19,7 +19,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def may_be_foreign(path: Path) -> bool:
-    """Whether another user, except root, may have written a file or folder. This is assumed of a link."""
+    """Whether a user other than root and ourselves may have written a file or folder. For a link, assume so."""
     mode = path.lstat().st_mode
     return is_foreign(path) or stat.S_ISLNK(mode) or bool(mode & stat.S_IWOTH)
 

@@ -186,7 +186,7 @@ class Plan(Block):
     """Measurements to plan, with their assumed noise."""
 
     steps: int = key(20, "1", "steps of the walk for which standard errors are reported", ge=2, le=500)
-    max_steps: int = key(50, "1", "steps of the longest walk to consider", ge=2, le=500)
+    max_steps: int = key(50, "1", "maximum number of steps of a walk to consider", ge=2, le=500)
     errors: dict[str, float] = key(
         dict, "", "standard errors to reach, in the key's unit", bounds="a number above 0 for each key of identify.fit"
     )

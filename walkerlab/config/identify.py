@@ -31,7 +31,7 @@ class Identify(Recorded):
         dict,
         "",
         "parameters that were measured by other means, in the key's unit",
-        bounds="[value, standard deviation] for each key, the second above 0",
+        bounds="[value, standard deviation] for each key, with a standard deviation above 0",
     )
     first_leg: Literal[1, 2] | None = key(
         None,

@@ -58,12 +58,12 @@ class Recorded(Block):
         default_in_words="times as in the file",
     )
     from_s: float | None = key(
-        None, "s", "time at which the part to read begins", bounds="any number", default_in_words="the first sample"
+        None, "s", "time from which on the recording is read", bounds="any number", default_in_words="the first sample"
     )
     to_s: float | None = key(
         None,
         "s",
-        "time at which the part to read ends",
+        "time up to which the recording is read",
         bounds="any number greater than from_s",
         default_in_words="the last sample",
     )

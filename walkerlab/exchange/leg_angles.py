@@ -45,7 +45,7 @@ MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbou
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-MAX_STRETCH: Final = 0.3  # stretches off the course that are longer than this fraction of a step are lasting jumps
+MAX_STRETCH: Final = 0.3  # a leg that is off its course for longer than this fraction of a step has jumped
 BORDER: Final = 0.1  # fraction of a step at either end of a fit that other fits cover
 LASTING_BORDER: Final = 0.15  # the same for lasting jumps
 LENGTH_TRIALS: Final = 16  # number of lengths that are tried first for a stretch
@@ -55,7 +55,7 @@ STANDARD_ERRORS: Final = 7.0
 MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
 TYPICAL_PERCENT: Final = 30
 MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
-MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
+MIN_STRIKE_SAMPLES: Final = 12  # minimum number of samples in the two steps around a strike
 MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
 # A stretch that explains more than this fraction of the limit is searched for together with the strike.
 JOINT_SEARCH_FRACTION: Final = 0.5
@@ -73,7 +73,7 @@ class Way:
 
 
 def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Return the walk with continuous leg angles from the vertical, positive with the foot ahead, in one direction.
+    """Return the walk with mended leg angles: continuous, from the vertical, positive with the foot ahead.
 
     source  name of the recording, for messages
 
@@ -391,7 +391,7 @@ def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> 
 
 
 def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return, for spans (first, end), the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
+    """Return, for each span (first, end), how much of a jump there a fit does not follow, and the sums of residuals.
 
     sums  cumulative sums of the fit's orthonormal basis and of its residuals
     """

@@ -165,7 +165,7 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Subtract the tilt of the camera, which is the forward lean of the direction from which angles are measured.
+    """Subtract the tilt of the camera: how far the direction that the recording takes as vertical leans forward.
 
     The tilt follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """

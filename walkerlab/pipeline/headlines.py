@@ -124,7 +124,7 @@ class RunDifference:
 
     config: tuple[tuple[str, Any, Any], ...]  # config keys that differ, with both values as JSON
     numbers: Mapping[str, tuple[Pair, ...]]  # all values of a stage in both runs, by stage
-    headlines: Mapping[str, tuple[Pair, ...]]  # the headline quantities among them, by stage
+    headlines: Mapping[str, tuple[Pair, ...]]  # the headline quantities among the pairs above, by stage
     # only_first, only_second: stages with a result in one run only
     only_first: tuple[str, ...]
     only_second: tuple[str, ...]

@@ -237,7 +237,7 @@ def identify_with(
 def identify_beginning(
     subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
-    """Fit a model to a walk whose first step is that of `measured.first_leg`. The result is as in `identify_with`."""
+    """Fit a model to a walk that begins with a step of `measured.first_leg`. Returns the same as `identify_with`."""
     model = subject.model
     problem = problem_of(subject, measured, question)
     # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.

@@ -1,4 +1,4 @@
-"""Use config keys as parameters of families of walkers, with unit, value, and the config at other values."""
+"""Parameters of families of walkers, named by config keys: their units, their values, and configs with other values."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -254,7 +254,7 @@ def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[
 
 
 def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions that fit the printed values better than the stated one, each with the question restated in it.
+    """Yield conventions that fit the printed values better than the stated one, with the question in that convention.
 
     A convention must bring the right gait much closer to the printed values, or at least closer if it puts both feet on
     the slope and the stated one does not.

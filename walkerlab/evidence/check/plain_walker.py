@@ -208,7 +208,7 @@ class PlainWalker:
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return the sum (rad) of both legs' angles minus the window, which is 0 at a touch."""
+        """Return how far (rad) the sum of both legs' angles is from `window`, where the swing foot touches."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:

@@ -88,7 +88,7 @@ def mean_over_last_steps(time: Array, energy: Array, step_ends: Array) -> Energy
 
 @dataclass(frozen=True)
 class RigidMeasurements:
-    """Measurements on the gait of one set of equations, and on a walk from it."""
+    """Measurements of the gait of one set of equations, and of a walk that starts from it."""
 
     state: State  # fixed point, rad and rad/s
     steps: int  # completed steps, out of ten

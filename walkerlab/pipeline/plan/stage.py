@@ -80,7 +80,7 @@ class Option:
     help: str
     kind: OptionKind = "word"
     needs: tuple[str, ...] = ()  # flags that must be given with it
-    runs: str = ""  # stage to run instead if the option is given, which then sets no key
+    runs: str = ""  # stage that the option selects instead; such an option sets no config key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
@@ -98,8 +98,8 @@ def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
         ),
         Option("--belt-speed", "belt_speed_m_s", "M/S", "Speed of a treadmill's belt.", "float"),
         Option("--fps", "fps", "N", "Frames per second of the film.", "float"),
-        Option("--from-s", "from_s", "S", "Time at which the part to read begins.", "float"),
-        Option("--to-s", "to_s", "S", "Time at which the part to read ends.", "float"),
+        Option("--from-s", "from_s", "S", "Read the recording from this time on.", "float"),
+        Option("--to-s", "to_s", "S", "Read the recording up to this time.", "float"),
         Option(
             "--min-likelihood", "min_likelihood", "P", "Likelihood below which a marker counts as missing.", "float"
         ),

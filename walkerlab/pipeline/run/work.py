@@ -156,7 +156,7 @@ class Spread:
         if self._deaths > MAX_DEATHS and not self._alive:
             raise NoAnswer(
                 f"all worker processes died: {type(error).__name__}: {error}",
-                "Results so far are kept, and the same command resumes. Check this machine's memory and limits.",
+                "Results are kept: run the same command again to resume. Check this machine's memory and limits.",
             )
         middle = len(batch) // 2
         if failures and middle:

@@ -128,7 +128,7 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return the flip at which a branch begins, with two periods of the gait there, or an empty list."""
+    """Return, in a list, the flip where a branch begins, with its gait taken twice. It is empty without a flip."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:

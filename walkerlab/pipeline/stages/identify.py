@@ -199,8 +199,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a row with a prior, and its distance from what the walk alone gives, in standard errors of the
-    difference."""
+    """Return the row of a prior. Its distance from the walk's own estimate is in standard errors of the difference."""
     return {
         "key": pull.key,
         "value": pull.value,

@@ -351,11 +351,11 @@ def drive_measures(walk: WalkRecord) -> dict[str, Any]:
 
 
 def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
-    """Return how the end of a walk on even ground repeats, and when the walk leaves its gait.
+    """Find after how many steps a walk on even ground repeats at its end, and at which step it leaves its gait.
 
     repeats_after  steps after which the last steps repeat, 0 if they do not
-    leaves_gait_at  number of the step with which a walk leaves the gait on which it starts, or None if it stays or
-                    starts elsewhere
+    leaves_gait_at  number of the step at which a walk leaves the gait that it started on, or None if it stays or
+                    started elsewhere
     """
     if walk.steps < MIN_REPEATED or walk.foothold_height_m is not None:
         return {"repeats_after": 0, "leaves_gait_at": None}

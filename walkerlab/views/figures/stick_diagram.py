@@ -45,11 +45,11 @@ SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 ROOM_BELOW = 0.36
-"""Room (in) for landing times below the lowest foot."""
+"""Space (in) for landing times below the lowest foot."""
 SIDE_INCHES = 0.7
-"""Room (in) for axis labels at the side."""
+"""Space (in) for axis labels at the side."""
 ROOM_ABOVE = 1.05
-"""Room (in) for the legend."""
+"""Space (in) for the legend."""
 MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
 NO_STEPS = Group(

@@ -99,7 +99,7 @@ def walk_of(result: Content, look: Look) -> DrawnWalk:
 
 
 def touch_times(steps: Group) -> Array:
-    """Return the times of the heel strikes (s), which are none if no step was completed."""
+    """Return the times of the heel strikes (s). The array is empty if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
@@ -165,8 +165,7 @@ def redoes_the_procedure(results: Results) -> bool:
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """Plot each leg's velocity in walks of the rigid model, from the start, and of the contact model, from the adjusted
-    start."""
+    """Plot each leg's velocity in two walks: of the rigid model, and of the contact model from the adjusted start."""
     result = results[TUNE_STAGE]
     named = redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])

@@ -12,7 +12,7 @@ from walkerlab.views.report.tables import Table, flatten
 COLUMN_DIGITS: Final = 5
 """Significant digits of the largest number in a column or, if the numbers differ too much in size, of each number."""
 MAX_PLAIN: Final = 1e6
-"""Magnitude from which on numbers are written with a power of ten."""
+"""Numbers of at least this magnitude are written with a power of ten."""
 EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, graphicx, siunitx}"
 WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
