@@ -298,6 +298,17 @@ def test_wrong_leg_length_is_named_with_its_right_value_in_steps_that_hardly_sho
     assert (better, fixed) == (pytest.approx(1.0, abs=2e-3), leg)
 
 
+def test_gain_of_freeing_a_doubted_parameter_is_about_that_of_a_whole_fit():
+    *_, model, start = walker()
+    measured = MeasuredWalk(*measure_steps(model, start, np.random.default_rng(11), steps=20))
+    wrong = identify(measured, LEG + "=1.004", fit={"slope_deg": None, HIP: None})
+    assert wrong.verdict.fit == "fits-but"
+    gain = float(re.search(rf"{LEG} of .* by about ([\d.]+): estimate it as well", " ".join(wrong.verdict.reasons))[1])
+    right = identify(measured, LEG + "=1.004", fit={"slope_deg": None, HIP: None, LEG: None})
+    assert right.verdict.log_likelihood - wrong.verdict.log_likelihood == pytest.approx(gain, rel=0.15)
+    assert gain > 3.0
+
+
 @pytest.mark.parametrize("guesses", [(), ("slope_deg=3.2", HIP + "=9")])
 def test_wrong_guesses_of_the_estimates_raise_no_doubt(guesses):
     result = identify(twenty_steps(), *guesses, fit={"slope_deg": None, HIP: None})

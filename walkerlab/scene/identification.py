@@ -91,6 +91,7 @@ MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of 
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over which walks count as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
+PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
 NEAR_CONFIG: Final = 2.0  # loss of log-likelihood, two standard errors, below which estimates agree with the config
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
@@ -456,7 +457,7 @@ def suggest_parameter(
     distance = distance_from_config(keys, fitted)
     # Estimates farther away show that the config's values are wrong guesses, unless one change alone explains the walk.
     doubted = measured & (NEAR_CONFIG < distance < FAR_FROM_CONFIG) & (not fitted.forecast.measured.sampled)
-    for index in [each for each in order if gains[each] > DECISIVE_GAIN or doubted[each]][:MAX_FREED]:
+    for index in [each for each in order if gains[each] >= PROMISING_GAIN or doubted[each]][:MAX_FREED]:
         other = others[index]
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN

@@ -28,5 +28,5 @@ def test_command_with_killed_workers_ends_without_an_answer(walker, command):
     _, said = process.communicate(timeout=DEADLINE_S)
     assert killed
     assert process.returncode == 4, said
-    assert "error: a worker process ended before it had answered (SIGKILL)." in said
+    assert "a worker process ended before it had answered (SIGKILL)." in said
     assert "Traceback" not in said
