@@ -324,6 +324,18 @@ def test_table_of_periods_alone_is_read(tmp_path):
     assert measured.lengths_m is None
 
 
+def test_steps_of_the_documentation_hardly_show_that_the_leg_is_wrong(gait):
+    """docs/identify.md states the difference of the log-likelihood, 0.5."""
+    table = Path(__file__).parents[3] / "docs" / "downloads" / "stopwatch.csv"
+    asked = ask(table, "identify.fit={slope_deg: null, walker.hip_mass_kg: null}")
+    wrong, right = (
+        identify.run(taken(*asked, f"walker.leg_length_m={leg}"), gait, Silent()).summary["models"][0]
+        for leg in (0.97, 1.0)
+    )
+    assert right["log_likelihood"] - wrong["log_likelihood"] == pytest.approx(0.5, abs=0.05)
+    assert wrong["fit"] == "fits"
+
+
 def test_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
     """If all lengths are equal to the last digit, they show no noise, so that any noise of the periods would fit."""
     path = tmp_path / "table.csv"
