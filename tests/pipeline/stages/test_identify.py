@@ -325,7 +325,7 @@ def test_table_of_periods_alone_is_read(tmp_path):
 
 
 def test_steps_of_the_documentation_hardly_show_that_the_leg_is_wrong(gait):
-    """docs/identify.md states the difference of the log-likelihood, 0.5."""
+    """docs/identify-mistakes.md states the difference of the log-likelihood, 0.5."""
     table = Path(__file__).parents[3] / "docs" / "downloads" / "stopwatch.csv"
     asked = ask(table, "identify.fit={slope_deg: null, walker.hip_mass_kg: null}")
     wrong, right = (
