@@ -406,7 +406,7 @@ def test_file_without_a_table_gets_an_explanation(text, message, tmp_path):
         read(tmp_path, "walk.txt", text)
 
 
-def test_table_of_two_tracks_advises_another_export(tmp_path):
+def test_table_with_two_tracks_is_rejected_with_advice_to_export_each_separately(tmp_path):
     text = "mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n0.0\t1.0\t2.0\t0.0\t1.5\t2.5\n0.1\t1.1\t2.1\t0.1\t1.6\t2.6\n"
     with pytest.raises(ConfigError, match="Tracker with several tracks") as caught:
         read(tmp_path, "walk.txt", text)
