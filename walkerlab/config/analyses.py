@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, check_against, check_entries, check_value, key, meaning_error, why_not_rising
 from walkerlab.outcome import Outcome
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
@@ -80,28 +80,18 @@ _UNIT: Final = "unit of the key"
 if TYPE_CHECKING:
 
     class _Span(Block):
-        """Range of values, with the keys `from` and `to`."""
+        """Declaration of the key `from`."""
 
 else:
     # `from` is a keyword of Python, so a class body cannot declare a key of this name.
-    _Span = create_model(
-        "_Span",
-        __base__=Block,
-        __validators__={
-            "above": check_against(
-                "to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}"
-            )
-        },
-        **{
-            "from": (float, key(1.0e-4, _UNIT, "start of the range", bounds="a number below `to`")),
-            "to": (float, key(0.1, _UNIT, "end of the range", bounds="a number above `from`")),
-        },
-    )
+    _FROM = key(1.0e-4, _UNIT, "start of the range", bounds="a number below `to`")
+    _Span = create_model("_Span", __base__=Block, **{"from": (float, _FROM)})
 
 
 class Span(_Span):
     """Config key and the range over which it varies."""
 
+    to: float = key(0.1, _UNIT, "end of the range", bounds="a number above `from`")
     over: str = key(
         "slope_rad",
         "",
@@ -110,14 +100,11 @@ class Span(_Span):
         pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$",
     )
 
+    _above = check_against("to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}")
+
     @property
     def least(self) -> float:
         return float(getattr(self, "from"))
-
-    @property
-    def most(self) -> float:
-        value: Any = getattr(self, "to")  # noqa: B009 - declared above, where the type checker cannot see it
-        return float(value)
 
 
 class Continuation(Span):
@@ -164,14 +151,7 @@ class Design(Block):
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
     )
 
-    @field_validator("over", "keep")
-    @classmethod
-    def _upwards(cls, value: Bounds) -> Bounds:
-        for name, bounds in value.items():
-            if len(bounds) != 2 or bounds[0] >= bounds[1]:
-                text = ", ".join(f"{bound:g}" for bound in bounds)
-                raise meaning_error(f"has bounds for {name}, [{text}]: give two numbers, the lower one first")
-        return value
+    _rising = check_entries("over", "keep", why=why_not_rising)
 
     @field_validator("keep")
     @classmethod
@@ -199,13 +179,9 @@ class Plan(Block):
         0.02, "1", "relative change of the start's coordinates, for walks that do not start on the gait", gt=0.0, le=0.5
     )
 
-    @field_validator("errors")
-    @classmethod
-    def _positive(cls, value: dict[str, float]) -> dict[str, float]:
-        for name, error in value.items():
-            if not error > 0.0:
-                raise meaning_error(f"has {error:g} for {name}, not a number above 0")
-        return value
+    _positive = check_entries(
+        "errors", why=lambda name, error: "" if error > 0.0 else f"has {error:g} for {name}, not a number above 0"
+    )
 
 
 _DEFAULT_ROUGHNESS_M: Final = (0.0005, 0.001, 0.002)
@@ -271,12 +247,7 @@ class Case(Block):
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
     twin: bool = key(False, "", "whether a twin, the walker scaled to another size, must take the same steps")
 
-    @field_validator("expected")
-    @classmethod
-    def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
-        if not value:
-            raise meaning_error("must name an outcome")
-        return value
+    _some_outcome_is_right = check_value("expected", why=lambda outcomes: "" if outcomes else "must name an outcome")
 
 
 class Stability(Block):

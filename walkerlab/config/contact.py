@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, check_against, check_value, key, meaning_error
 from walkerlab.extensions import origin_of, words
 
 MM_PER_M: Final = 1000.0
@@ -169,12 +169,10 @@ class Footholds(Block):
         ),
     )
 
-    @field_validator("heights_m")
-    @classmethod
-    def _check_heights(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if any(abs(height) > 1e3 for height in value):
-            raise meaning_error("must be numbers from -1e3 to 1e3")
-        return value
+    _heights = check_value(
+        "heights_m",
+        why=lambda heights: "must be numbers from -1e3 to 1e3" if any(abs(each) > 1e3 for each in heights) else "",
+    )
 
     @property
     def even(self) -> bool:

@@ -5,10 +5,10 @@ numbers.
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from functools import cache, reduce
-from itertools import chain
+from itertools import chain, starmap
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_validator
@@ -90,6 +90,33 @@ def _storable(text: str) -> str:
 
 Text = Annotated[str, AfterValidator(_storable)]
 """Text that a user writes, such as a name or a path."""
+
+
+def check_value(*names: str, why: Callable[[Any], str]) -> Any:
+    """Validate keys. `why` returns the reason for an error or ''."""
+
+    def check(value: Any) -> Any:
+        if reason := why(value):
+            raise meaning_error(reason)
+        return value
+
+    return field_validator(*names)(check)
+
+
+def check_entries(*names: str, why: Callable[[str, Any], str]) -> Any:
+    """Validate each entry, a name and its value, of keys that hold several."""
+    return check_value(*names, why=lambda entries: next(filter(None, starmap(why, entries.items())), ""))
+
+
+def why_not_rising(name: str, bounds: Sequence[float] | None) -> str:
+    """Explain why the bounds of `name` are not two rising numbers, or return '' if they are, or if they are None."""
+    if bounds is None or (len(bounds) == 2 and bounds[0] < bounds[1]):
+        return ""
+    return f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first"
+
+
+def listed(numbers: Sequence[float]) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:

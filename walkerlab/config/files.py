@@ -35,10 +35,9 @@ class ConfigFile:
 
 def is_file(path: Path) -> bool:
     """Whether a path is a file. Return False for a path that the system refuses, such as one that is too long."""
-    try:
+    with contextlib.suppress(OSError):
         return path.is_file()
-    except OSError:
-        return False
+    return False
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -61,9 +60,11 @@ PUBLISHED: Final = Path("published")
 """Folder of the built-in configs of published gaits."""
 
 
-def find_config(path: Path) -> ConfigFile:
+def find_config(path: Path | None) -> ConfigFile:
     """Find the config that `--config` names: an existing path, or the name of a built-in config or of a published
-    gait."""
+    gait. For None, it is the paper's."""
+    if path is None:
+        return builtin_config(DEFAULT)
     if not is_file(path):
         if str(path) in builtin_names():
             return builtin_config(str(path))

@@ -4,7 +4,7 @@ from typing import Final, Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Text, check_against, key, meaning_error
+from walkerlab.config.fields import Text, check_against, check_entries, key, listed, meaning_error, why_not_rising
 from walkerlab.config.recording import Recorded
 
 Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
@@ -92,13 +92,7 @@ class Identify(Recorded):
     def models(self) -> tuple[str, ...]:
         return ("rigid", "contact") if self.model == "both" else (self.model,)
 
-    @field_validator("fit")
-    @classmethod
-    def _upwards(cls, value: dict[str, Pair | None]) -> dict[str, Pair | None]:
-        for name, bounds in value.items():
-            if bounds is not None and (len(bounds) != 2 or bounds[0] >= bounds[1]):
-                raise meaning_error(f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first")
-        return value
+    _rising = check_entries("fit", why=why_not_rising)
 
     @field_validator("prior")
     @classmethod
@@ -112,7 +106,3 @@ class Identify(Recorded):
     @classmethod
     def _remove_duplicates(cls, value: tuple[Nuisance, ...]) -> tuple[Nuisance, ...]:
         return tuple(dict.fromkeys(value))
-
-
-def listed(numbers: Pair) -> str:
-    return ", ".join(f"{number:g}" for number in numbers)

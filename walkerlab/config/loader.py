@@ -78,13 +78,7 @@ def load(
 
     Raises a ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
-    file = (
-        path
-        if isinstance(path, files.ConfigFile)
-        else files.builtin_config(files.DEFAULT)
-        if path is None
-        else files.find_config(path)
-    )
+    file = path if isinstance(path, files.ConfigFile) else files.find_config(path)
     tree = files.merge_layers(files.read_layers(file))
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:

@@ -12,7 +12,7 @@ from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustn
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact, Footholds
 from walkerlab.config.drives import PushOff, drives_and_springs_of, push_offs
-from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
+from walkerlab.config.fields import Block, Text, check_against, check_value, key, meaning_error
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
 from walkerlab.extensions import words
@@ -175,12 +175,11 @@ class Tune(Block):
         True, "", "whether to also stiffen the contact towards the rigid limit, to find where deviations fall to 1e-4"
     )
 
-    @field_validator("swing_factors", "stance_factors")
-    @classmethod
-    def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value[0] >= value[1]:
-            raise meaning_error("the first must be below the second")
-        return value
+    _rising = check_value(
+        "swing_factors",
+        "stance_factors",
+        why=lambda pair: "" if pair[0] < pair[1] else "the first must be below the second",
+    )
 
 
 QUESTIONS: Final = (

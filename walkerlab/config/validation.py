@@ -29,16 +29,11 @@ _REASONS: Final = {
     "float_type": "is not a number",
     "int_type": "is not an integer",
     "string_type": "is not text",
-    "tuple_type": "is not a list",
-    "list_type": "is not a list",
-    "dict_type": "is not a block of keys",
-    "model_type": "is not a block of keys",
+    **dict.fromkeys(("tuple_type", "list_type"), "is not a list"),
+    **dict.fromkeys(("dict_type", "model_type"), "is not a block of keys"),
     "finite_number": "is not finite",
     "literal_error": "is not allowed",
-    "greater_than": "is out of bounds",
-    "greater_than_equal": "is out of bounds",
-    "less_than": "is out of bounds",
-    "less_than_equal": "is out of bounds",
+    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), "is out of bounds"),
     "missing": "has too few values",
     "too_long": "has too many values",
     "string_pattern_mismatch": "is not valid",
@@ -47,9 +42,7 @@ _REASONS: Final = {
 MAX_PROBLEMS: Final = 100
 NAMES_OF_BODIES: Final = {
     "hinges": ("parent", "child"),
-    "particles": ("body",),
-    "feet": ("body",),
-    "couplings": ("body",),
+    **dict.fromkeys(("particles", "feet", "couplings"), ("body",)),
 }
 MOVED_RAD: Final = 1e-12
 MAX_START_ERROR: Final = 0.01  # rad or rad/s; a start is rejected if a stated value is off by more than this

@@ -157,7 +157,7 @@ def source_of(path: Path | None, runs: Path) -> str:
 
     The path is relative so that a project can be moved together with its runs.
     """
-    file = (files.builtin_config(files.DEFAULT) if path is None else files.find_config(path)).path.resolve()
+    file = files.find_config(path).path.resolve()
     if file.parent == files.BUILTIN_FOLDER.resolve():
         return f"{BUILTIN}{file.name}"
     return os.path.relpath(file, runs.resolve())

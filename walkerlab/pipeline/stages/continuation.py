@@ -89,7 +89,7 @@ class FamilyQuestion:
 
 def question_over(block: analyses.Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
     parameter = parameter_of(block.over, config, (*path, "over"))
-    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
+    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.to))
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
@@ -117,7 +117,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     content = Content(groups(families, answer, config, parameter, None if second is None else second.parameter), answer)
     if not any(family.branches for family in families):
         raise NoAnswer(
-            f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
+            f"no gait was found with {parameter.key} from {block.least:g} to {block.to:g} {parameter.unit}: "
             f"no gait at any of {len(question.start_values())} trial values",
             "Choose another span (--from, --to), or change other parameters.",
             content,
@@ -236,7 +236,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
         "over": parameter.key,
         "unit": parameter.unit,
         "from": config.continuation.least,
-        "to": config.continuation.most,
+        "to": config.continuation.to,
         "branches": rows(branch_rows),
         "bifurcations": rows(bifurcation_rows),
         "first_doubling": values_by_model(lambda family: first_doubling(family.branches)),
