@@ -101,7 +101,8 @@ def scene_on_pads(
     Raises NoAnswer if the pitch of the pads needs a contact gait and none is found.
     """
     pitch = None
-    if wants_own_pitch(require_contact(config)):
+    contact = require_contact(config)
+    if contact.terrain == "checkerboard" and contact.pad_pitch == "own":
         search = search or contact_gait(config, rigid_step, rigid_state)
         if search.gait is None:
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
@@ -165,10 +166,6 @@ def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: Sta
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
     return contact_gait(config, rigid_step_length_m, rigid_state)
-
-
-def wants_own_pitch(contact: Contact) -> bool:
-    return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:

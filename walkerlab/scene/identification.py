@@ -181,7 +181,8 @@ def identify_walk(
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
-    results = [identify_with(model, config, measured, gait, question, note, begin) for model in question.models]
+    subjects = (find_model_gait(model, config, gait, note) for model in question.models)
+    results = [identify_with(subject, measured, question, begin) for subject in subjects]
     answers = [result for result in results if isinstance(result, Identification)]
     verdicts = tuple(
         result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", (result,))
@@ -202,20 +203,13 @@ def rank(answer: Identification) -> tuple[bool, float]:
 
 
 def identify_with(
-    model: str,
-    config: Config,
-    measured: MeasuredWalk,
-    gait: Mapping[str, Any],
-    question: Identify,
-    note: Callable[[str], None],
-    begin: Begin,
+    subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
     """Fit one model, or return the reason as text if no walk of the model can be fitted.
 
     If it is not known which leg of two that differ swings first, both are tried.
     """
-    subject = find_model_gait(model, config, gait, note)
-    stride = ConfigFamily(config, question.keys).stride
+    stride = ConfigFamily(subject.config, question.keys).stride
     if stride == 1 or measured.first_leg is not None:
         answer = identify_beginning(subject, measured, question, begin)
         stated = FirstLeg(measured.first_leg, "statement", None) if stride > 1 and measured.first_leg else None
@@ -339,7 +333,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     if verdict[0] in USABLE:
         others = (other_leg, fixed) if len(left_open) < len(keys) else ()
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
-        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
+        strong = (describe_pull(pull) for pull in pulls if pull.standard_deviations > STRONG_PULL)
+        reasons = (*verdict[1], *strong, *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
     elif second_leg and verdict[0] == "misfit" and (describe_limp(steps) or describe_limp(best)):
         verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
@@ -416,10 +411,6 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
-
-
-def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
-    return tuple(pull for pull in pulls if pull.standard_deviations > STRONG_PULL)
 
 
 def describe_pull(pull: Pull) -> str:
@@ -535,9 +526,8 @@ def gain_of_freeing(
     free = fit(wider, np.insert(fitted.u, count, other.value / other.scale))
     if free is None or free.reason:
         return 0.0, 0.0
-    return float(free.evaluation.likelihood - fitted.evaluation.likelihood), float(
-        free.u[count]
-    ) - other.value / other.scale
+    gain = float(free.evaluation.likelihood - fitted.evaluation.likelihood)
+    return gain, float(free.u[count]) - other.value / other.scale
 
 
 def problem_for(

@@ -28,10 +28,6 @@ class Parameter:
     unit: str  # unit of its values
     path: tuple[str, ...]
 
-    @property
-    def varies_second_leg(self) -> bool:
-        return SECOND_LEG in self.path
-
     def value_in(self, config: reads.ContactConfig) -> float:
         value = stated_value(config, self.path)
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)

@@ -131,8 +131,6 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
         raise walkers.contact_required_error("basin.model: contact", config.walker, "Add one.")
-    # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.contact import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps
@@ -141,9 +139,9 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     answer = contact.contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
     scene = replace(contact.scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
-    starts = build_scaled_starts(scene, rigid, state, steps, answer, contact.tolerances_of(config, steps))
+    starts = contact.build_scaled_starts(scene, rigid, state, steps, answer, contact.tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
-    return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
+    return ContactQuestion(scene, rigid, contact.scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
 def group_of(settings: analyses.Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats) -> Group:

@@ -297,9 +297,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
     """Yield a row for each point where one of a model's assumptions ceases to hold."""
     for branch in family.branches:
         for crossing in branch.crossings:
-            monitor = crossing.monitor
-            limit = {"what": monitor.meaning, "limit": monitor.limit}
-            yield {"period": branch.period, "value": crossing.value, **limit}
+            what, limit = crossing.monitor.meaning, crossing.monitor.limit
+            yield {"period": branch.period, "value": crossing.value, "what": what, "limit": limit}
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:

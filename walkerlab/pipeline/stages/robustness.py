@@ -1,6 +1,6 @@
 """Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any, Final
@@ -121,7 +121,8 @@ def run(
         numbers = gait_quantities(gait)
         assert numbers is not None, "a gait has quantities"
         answer["gaits"].append({"model": subject.model, **numbers})
-        answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
+        keys = parameters_read(subject, config.robustness.to)
+        answer["sensitivity"] += sensitivities(subject, keys, numbers, progress, jobs_but_for_walks)
         # An unstable gait survives no disturbance.
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
@@ -299,14 +300,9 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
 
 
 def sensitivities(
-    subject: ModelUnderTest,
-    requested: tuple[str, ...] | None,
-    numbers: Mapping[str, float],
-    progress: Progress,
-    jobs: int,
+    subject: ModelUnderTest, keys: Sequence[str], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
     """Return rows of derivatives in order of decreasing relative effect. Parameters with value 0 come last."""
-    keys = parameters_read(subject, requested)
     label = f"robustness: gradients of the {subject.model} model"
     rows = list[dict[str, Any]]()
     results = map_in_order([partial(gradients_of, subject, key) for key in keys], jobs)
