@@ -38,16 +38,8 @@ class KeyReference:
 
 def keys() -> Iterator[KeyReference]:
     """Yield every key of a config file, in the schema's order."""
-    builtins = ", ".join(files.builtin_names())
-    yield KeyReference(
-        key="extends",
-        type="text",
-        unit="",
-        bounds=f"a file, {builtins}",
-        default="none",
-        meaning=EXTENDS_MEANING,
-        source="this project",
-    )
+    extends = fields.key(None, "", EXTENDS_MEANING, bounds=f"a file, {', '.join(files.builtin_names())}")
+    yield _reference(("extends",), FieldInfo.from_annotated_attribute(str, extends))
     for path, field in fields.leaves(Config):
         yield _reference(path, field)
         if path == ("slope_rad",):

@@ -192,10 +192,8 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
             yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
         elif not is_bare_dimension(member):
             variables[name] = read_variable(name, member, names, budget)
-    if path:
-        yield path, Group(variables, read_attributes(parent))
-    elif variables:
-        yield path, Group(variables)
+    if path or variables:
+        yield path, Group(variables, read_attributes(parent) if path else {})
 
 
 def is_bare_dimension(dataset: Any) -> bool:
@@ -211,7 +209,7 @@ def names_of(members: Mapping[str, Any]) -> dict[int, str]:
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
     """Read one array with its labels. `names` maps the addresses of the group's members to their names."""
     values = read_values(name, dataset, budget)
-    if read_text(dataset, "dtype", "") == "bool":
+    if "dtype" in dataset.attrs and read_text(dataset, "dtype") == "bool":
         values = values.astype(np.bool_)
     scales = [] if dataset.is_scale else [h5py.h5o.get_info(axis[0].id).addr for axis in dataset.dims]
     if not all(scale in names for scale in scales):
@@ -285,10 +283,8 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
     return attributes
 
 
-def read_text(holder: Any, name: str, default: str | None = None) -> str:
-    """Read a text attribute, and return `default` if it is absent."""
-    if default is not None and name not in holder.attrs:
-        return default
+def read_text(holder: Any, name: str) -> str:
+    """Read a text attribute."""
     value = holder.attrs[name]
     if isinstance(value, bytes):
         return value.decode()

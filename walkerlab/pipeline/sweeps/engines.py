@@ -83,16 +83,14 @@ def local(options: EngineOptions) -> WorkerPool:
 def environment_of_workers() -> Iterator[None]:
     """Make processes that start in the `with` block use one thread and import nothing from the current folder."""
     changes = dict.fromkeys((*ONE_THREAD, "PYTHONSAFEPATH"), "1")
-    before = {name: os.environ.get(name) for name in changes}
+    before = {name: os.environ[name] for name in changes.keys() & os.environ.keys()}
     os.environ.update(changes)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in changes.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
 
 
 @contextlib.contextmanager

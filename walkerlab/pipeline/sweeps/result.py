@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.config.schema import Config
 from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, axis_label, unit_by_name
 from walkerlab.physics.solvers.system import Integers
-from walkerlab.pipeline.headlines import LAST_STEP_SOURCES, headlines
+from walkerlab.pipeline.headlines import headlines, last_step_values
 from walkerlab.pipeline.store import artifact, files, hdf5
 from walkerlab.pipeline.store.content import Content, Variable
 from walkerlab.pipeline.sweeps.chunk import Chunk
@@ -109,10 +109,7 @@ class Merge:
             numbers = json.loads(row.numbers)
             reason = row.reason if len(row.reason) <= MAX_REASON else f"{row.reason[: MAX_REASON - 1]}…"
             own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": reason}
-            last = {
-                name: numbers[list_name][-1] for name, list_name in LAST_STEP_SOURCES.items() if list_name in numbers
-            }
-            rows.append({**numbers, **last, **own})
+            rows.append({**numbers, **last_step_values(numbers), **own})
         self.has_row[indices] = True
         for name in dict.fromkeys(chain.from_iterable(rows)):
             have = [k for k, row in enumerate(rows) if name in row]
