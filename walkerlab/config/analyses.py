@@ -18,6 +18,12 @@ _Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
 _Bounds = tuple[_Bound, ...]  # empty for the default window
 
 
+def why_no_plane(coordinates: tuple[Coordinate, ...]) -> str:
+    """Explain why coordinates do not span a grid, or return '' if they do."""
+    fits = len(coordinates) in (2, 3) and len({*coordinates}) == len(coordinates)
+    return "" if fits else "must be two or three coordinates, each once"
+
+
 class Basin(Block):
     """Grid of starts just after heel strike. A coordinate that the grid does not vary keeps its value in the gait."""
 
@@ -52,12 +58,7 @@ class Basin(Block):
     steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
 
-    @field_validator("plane")
-    @classmethod
-    def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
-        if len(value) not in (2, 3) or len(set(value)) != len(value):
-            raise meaning_error("must be two or three coordinates, each once")
-        return value
+    _plane = check_value("plane", why=why_no_plane)
 
     @field_validator("cells", "lower", "upper")
     @classmethod
@@ -133,6 +134,12 @@ _QUANTITY_NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]
 
 
+def why_no_quantity(name: str, _bounds: list[float]) -> str:
+    """Explain why a name is not that of a gait quantity, or return '' if it is."""
+    text = f"names {name}, which is not a gait quantity; choose from {_QUANTITY_NAMES}"
+    return "" if name in get_args(Quantity) else text
+
+
 class Design(Block):
     """Optimisation problem of `walkerlab design`."""
 
@@ -153,13 +160,7 @@ class Design(Block):
 
     _rising = check_entries("over", "keep", why=why_not_rising)
 
-    @field_validator("keep")
-    @classmethod
-    def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
-        for name in value:
-            if name not in get_args(Quantity):
-                raise meaning_error(f"names {name}, which is not a gait quantity; choose from {_QUANTITY_NAMES}")
-        return value
+    _of_a_gait = check_entries("keep", why=why_no_quantity)
 
 
 class Plan(Block):

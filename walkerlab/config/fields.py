@@ -72,9 +72,8 @@ def key(
     words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
     settings: dict[str, Any] = {"default_factory" if callable(default) else "default": default, **limits}
     settings |= {"strict": False} if sequence or isinstance(default, tuple) else {}
-    return Field(
-        description=meaning, json_schema_extra={name: text for name, text in words.items() if text}, **settings
-    )
+    settings["json_schema_extra"] = {name: text for name, text in words.items() if text}
+    return Field(description=meaning, **settings)
 
 
 def meaning_error(reason: str) -> PydanticCustomError:
@@ -250,10 +249,9 @@ def describe_allowed(field: FieldInfo) -> str:
         optional = type(None) in get_args(field.annotation)
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
     bounds = bounds_of(field)
-    unit = annotation_of(field, "unit")
     what = describe_type(field.annotation)
     if what == "word" or bounds == ", ".join(words_of(field.annotation)) != "":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
-    return add_unit(bounds, unit)
+    return add_unit(bounds, annotation_of(field, "unit"))

@@ -46,10 +46,12 @@ def builtin_names() -> tuple[str, ...]:
 
 def config_to_extend(typed: str | None) -> str:
     """Return the config that a new one extends: `typed` if it is a file or a built-in name, otherwise the paper's."""
-    is_config = typed is not None and (
-        typed in builtin_names() or (is_file(Path(typed)) and Path(typed).suffix != ".h5")
-    )
-    return str(typed) if is_config else DEFAULT
+    return typed if typed is not None and is_config(typed) else DEFAULT
+
+
+def is_config(typed: str) -> bool:
+    """Whether a text names a built-in config, or a file that is not an artifact."""
+    return typed in builtin_names() or (is_file(Path(typed)) and Path(typed).suffix != ".h5")
 
 
 def builtin_config(name: str) -> ConfigFile:
@@ -277,8 +279,7 @@ def parse_setting(text: str) -> ConfigSetting:
     if len(path) > MAX_DEPTH:
         raise problem_error(start, f"nested deeper than {MAX_DEPTH} levels")
     column = len(key) + 2
-    node = read(value, source, column)
-    return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
+    return ConfigSetting(path, read(value, source, column) or Scalar(Position(source, 1, column), None, ""), start)
 
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
@@ -313,10 +314,8 @@ def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies:
     if inner is None or (isinstance(inner, Scalar) and inner.value is None):
         inner = BlockNode(setting.position)
     if not isinstance(inner, BlockNode):
-        above = ".".join(setting.path[: depth + 1])
-        full_key = ".".join(setting.path)
-        raise problem_error(
-            setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
-        )
+        above = printable(".".join(setting.path[: depth + 1]))
+        full_key = printable(".".join(setting.path))
+        raise problem_error(setting.position, f"{full_key}: {above} is a value, not a block of keys")
     result.put(name, _place_setting(inner, setting, depth + 1, copies), block.keys.get(name, setting.position))
     return result

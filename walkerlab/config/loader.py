@@ -274,9 +274,8 @@ def tree_of(block: Mapping[str, Any], position: Position) -> BlockNode:
             return tree_of(value, position)
         if isinstance(value, list | tuple):
             return ListNode(position, [node(item) for item in value])
-        if hasattr(value, "tolist"):  # a NumPy array or number
-            return node(value.tolist())
-        return Scalar(position, value, str(value))
+        # NumPy's arrays and numbers have `tolist`.
+        return node(value.tolist()) if hasattr(value, "tolist") else Scalar(position, value, str(value))
 
     tree = BlockNode(position)
     for name, value in block.items():

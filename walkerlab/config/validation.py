@@ -67,9 +67,8 @@ def validate_tree(tree: BlockNode) -> schema.Config:
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
     # The schema has only slope_rad. A slope in degrees is validated by another model and then converted.
     if "slope_deg" in data:
-        degrees = data.pop("slope_deg")
         try:
-            data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=degrees).slope_deg)
+            data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=data.pop("slope_deg")).slope_deg)
         except ValidationError as error:
             problems += _problems(error, tree, schema.SlopeInDegrees)
     try:
@@ -330,8 +329,7 @@ def _find_key_elsewhere(name: str, exactly: bool) -> str:
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
-    match = name if exactly else nearest(name, paths)
-    return paths.get(match, "")
+    return paths.get(name if exactly else nearest(name, paths), "")
 
 
 def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:
