@@ -71,11 +71,10 @@ def contact_scene(
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     laws = ground_laws(contact)
-    rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
     drives = contact_drives(config)
-    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, knee_rules(config.walker), drives=drives)
     leg = config.walker.leg_length_m
     frame = contact_state.Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = contact_state.JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -115,12 +114,11 @@ def scene_on_pads(
 
 
 def contact_drives(config: reads.ContactConfig) -> ContactDrives:
-    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(law, fields)
+    return ContactDrives(hinge_law_of(config.walker), fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -156,8 +154,7 @@ def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_
     # This pitch is only the first guess. The search replaces it by the step length of the gait.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
-    legs_differ = have_different_legs(config)
-    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
+    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, have_different_legs(config))
 
 
 def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:

@@ -126,10 +126,8 @@ class ModelUnderTest:
         once.
         """
         quick = QUICK_WALKS[self.model]
-        return [
-            gait._replace(step_map=gait.step_map.replace_tolerances(quick))
-            for gait in self.gait_on_map().split_by_leg()
-        ]
+        gaits = self.gait_on_map().split_by_leg()
+        return [gait._replace(step_map=gait.step_map.replace_tolerances(quick)) for gait in gaits]
 
     @property
     def first_leg(self) -> int:

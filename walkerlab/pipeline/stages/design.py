@@ -71,8 +71,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         # Otherwise the result of this search would depend on the searches before it.
         gaits.z = own_z
         if name in checkpoint.kept:
-            entry = np.array(checkpoint.kept[name])
-            counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + current.size))
+            counts, gradient_norm, x, gaits.z = np.split(np.array(checkpoint.kept[name]), (2, 3, 3 + current.size))
             point = gaits.gait_at(x)
             gaits.counts = before + counts.astype(int)
             return DesignSearch(x, point, float(gradient_norm[0]))
@@ -201,9 +200,8 @@ class Gaits:
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = fixed_point.find_gaits(walker, config.seed).gait
-            match = (
-                match if gait is None else self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
-            )
+            if gait is not None:
+                match = self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
         if match is None:
             return None
         standpoint, numbers = match

@@ -83,9 +83,8 @@ def groups(
             continue
         own: dict[str, Group] = {}
         for number, curve in enumerate(family.curves):
-            own[f"curve_{number}"] = Group(
-                coordinates(curve, "point", "point"), {"kind": curve.kind, "period": curve.period}
-            )
+            about = {"kind": curve.kind, "period": curve.period}
+            own[f"curve_{number}"] = Group(coordinates(curve, "point", "point"), about)
         if family.regions is not None:
             periods = Variable(family.regions.period, ("first", "second"), "1", PERIOD_TEXT)
             own["regions"] = Group({**coordinates(family.regions, "first", "second"), "period": periods})

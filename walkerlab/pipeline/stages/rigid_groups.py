@@ -89,9 +89,8 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
 
 def place_variables(positions: Places, stance: Any) -> dict[str, Variable]:
     """Return positions of hip, knees and feet, along the slope from the first foothold and above the slope."""
-    points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
-        {} if positions.knees is None else {"knee": positions.knees}
-    )
+    points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)}
+    points |= {} if positions.knees is None else {"knee": positions.knees}
     variables = variables_over_time(hip_along_m=positions.hip[:, 0], hip_height_m=positions.hip[:, 1])
     for name, point in points.items():
         along, height = (reorder_by_leg(point[:, :, axis], stance) for axis in range(2))

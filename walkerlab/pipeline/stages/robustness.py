@@ -182,9 +182,8 @@ def refuse(config: RobustnessConfig) -> None:
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[ModelUnderTest]:
     progress.start("robustness: gaits")
-    gait = inputs["fixedpoint"].summary
     for model in models_of(config):
-        yield find_model_gait(model, config, gait, progress.note)
+        yield find_model_gait(model, config, inputs["fixedpoint"].summary, progress.note)
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
@@ -282,9 +281,8 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
     gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
-    walk = scene.walk(
-        as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=float(gait["step_length_m"])
-    )
+    length = float(gait["step_length_m"])
+    walk = scene.walk(as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=length)
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
 
@@ -293,8 +291,7 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
     most = cap(model, config)
     rows = []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
-        seen = asdict(rough_walks(counts, most))
-        measures = {name: value for name, value in seen.items() if value is not None}
+        measures = {name: value for name, value in asdict(rough_walks(counts, most)).items() if value is not None}
         rows.append({"model": model, "roughness_m": roughness, **measures, "cut_off_at": most})
     return rows
 

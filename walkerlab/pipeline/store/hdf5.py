@@ -72,11 +72,8 @@ class VariablesOnDisk(Mapping[str, Variable]):
         with h5py.File(file) as opened:
             members = {name: opened[name] for name in sorted(opened)}
             self._by_address = names_of(members)
-            self._names = [
-                name
-                for name, member in members.items()
-                if isinstance(member, h5py.Dataset) and not is_bare_dimension(member)
-            ]
+            datasets = {name: member for name, member in members.items() if isinstance(member, h5py.Dataset)}
+            self._names = [name for name, dataset in datasets.items() if not is_bare_dimension(dataset)]
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
     def __getitem__(self, name: str) -> Variable:
@@ -247,9 +244,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     texts = np.asarray(dataset[()])
     # Equal strings share one object, because a short string takes far more memory here than in the file.
     decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
-    values = np.empty(texts.shape, dtype=object)
-    values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]
-    return values
+    return np.array([decoded[text] for text in texts.ravel().tolist()], object).reshape(texts.shape)
 
 
 def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:

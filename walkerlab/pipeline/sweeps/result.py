@@ -158,8 +158,6 @@ class Merge:
 
     def endings(self) -> list[dict[str, Any]]:
         """Describe how walks ended, and whether the ground is why. Return [] for a stage that simulates no walk."""
-        question = self.question
-        config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
         pads = None
         pitch = self.values_of("pitch_m")
@@ -168,10 +166,10 @@ class Merge:
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_numbers(lengths[off])
             steps = last[np.isfinite(last)]
-            varied = PAD_PITCH in (axis.key for axis in question.axes)
-            laid = "" if config.contact is None or varied else config.contact.pad_pitch
+            varied = PAD_PITCH in (axis.key for axis in self.question.axes)
+            laid = "" if self.config.contact is None or varied else self.config.contact.pad_pitch
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
-        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT_STAGE, pads)
+        return describe_endings(count_texts(outcomes), self.config, self.question.stage == CONTACT_STAGE, pads)
 
     def numerical_error(self) -> dict[str, Any]:
         """Return the largest errors of the repeated walks, and under `ended_otherwise`, how many of them ended
@@ -238,12 +236,11 @@ def count_texts(texts: NDArray[Any]) -> dict[str, int]:
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     """Format a CSV table of the points: parameters, outcome and headline quantities or, if `every` is true, all
     values."""
-    group = content[""]
     dimensions = len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
-    variables = dict(group.variables)
+    variables = dict(content[""].variables)
     if not every:
         scalars = (name for name, variable in variables.items() if len(variable.dims) == dimensions)
         shown_names = ("outcome", *headlines(question.stage, scalars), "reason")
@@ -257,9 +254,8 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
     """Split a variable into columns, one for each entry of a list. Missing values are ''."""
     values = variable.values
-    points = values.shape[:dimensions]
     inner_shape = values.shape[dimensions:]
-    rows = values.reshape((int(np.prod(points)), *inner_shape))
+    rows = values.reshape((int(np.prod(values.shape[:dimensions])), *inner_shape))
     for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)
