@@ -148,7 +148,7 @@ def test_design_has_gait_and_gradient_for_every_parameter(walker, config, keys, 
     for key in keys:
         parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
         own = np.array([parameter.value_in(taken)])
-        found = Gaits(taken, asked, [parameter], fixedpoint.summary, Silent()).gait_at(own)
+        found = Gaits(taken, asked, fixedpoint.summary, Silent()).gait_at(own)
         if found is None:
             assert not robustness.gradients_of(subject, key), "the walker has no other value of it"
             assert may_be_refused("gradients", walker, key), key
