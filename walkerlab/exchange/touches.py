@@ -32,7 +32,7 @@ MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
 MIN_CROSSING_INTERVAL: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
-MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is no heel strike
+MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is not a heel strike
 ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
 MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
