@@ -220,7 +220,7 @@ def test_times_in_micro_and_nanoseconds_are_read(header, scale, tmp_path):
 
 def test_unit_that_contradicts_the_file_is_an_error(tmp_path):
     for units in ({"angle": "deg"}, {"angle 1": "deg"}):
-        with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units that it is in deg"):
+        with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units says deg"):
             read(tmp_path, "walk.csv", table(), units=units)
     assert holds_the_walk(read(tmp_path, "walk.csv", table(), units={"angle": "Radians", "time": "s"}))
     with pytest.raises(ConfigError, match="is in mm, but"):
@@ -294,7 +294,7 @@ def test_markers_with_placeholder_names_may_repeat(tmp_path):
 
 @pytest.mark.parametrize("count", [2, 4])
 def test_wrong_marker_count_in_the_header_is_rejected(count, tmp_path):
-    with pytest.raises(ConfigError, match=f"coordinates of 3, and its NumMarkers is {count}"):
+    with pytest.raises(ConfigError, match=f"coordinates for 3, and its NumMarkers is {count}"):
         read(tmp_path, "walk.trc", trc(count=count), LINES)
 
 
