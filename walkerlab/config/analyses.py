@@ -242,7 +242,7 @@ class Case(Block):
     agreement: float = key(
         1e-4,
         "1",
-        "largest difference of times from those of a ten times tighter tolerance or of the twin, in pendulum times",
+        "largest difference of times if a walk is repeated (tighter tolerance, other method, twin), in pendulum times",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)

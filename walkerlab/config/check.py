@@ -45,7 +45,7 @@ class PrintedValue:
 
 
 def digits_of(text: str) -> Digits:
-    """Read a printed number with its digits: '-.50' has 2 digits, the last one of unit 0.01."""
+    """Read a printed number with its digits: '-.50' has 2 digits, and the unit of the last one is 0.01."""
     mantissa, _, exponent = text.lstrip("+-").partition("e")
     scale = int(exponent or 0) - len(mantissa.partition(".")[2])
     figures = mantissa.replace(".", "").lstrip("0")

@@ -49,7 +49,7 @@ class Contact(Block):
         "impact", "", "impact: the IMPACT law of ADAMS; extensions add others", _ADAMS
     )
     stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
-    exponent: float = key(2.2, "1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)
+    exponent: float = key(2.2, "1", "exponent e of the normal force, 1 for a linear spring", _ADAMS, ge=1.0, le=3.0)
     damping: float = key(90.0, "N s/mm or N s/m", "c, reached at full_damping_penetration", _FIG_4B, ge=0.0, le=1e12)
     full_damping_penetration: float = key(
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
@@ -140,7 +140,7 @@ class Contact(Block):
         return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
-        """Return the unit that this block uses, of two such as `mm or m`."""
+        """Return the unit that this block uses. `either` names the two possible ones, as in `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def to_si(self) -> Self:

@@ -269,7 +269,7 @@ def parse_setting(text: str) -> ConfigSetting:
 
     Raises ConfigError if it is not KEY=VALUE with a YAML value.
     """
-    # A text with an attribute `source` comes from another option than --set, and messages must name that option.
+    # A text with an attribute `source` comes from an option other than --set, and messages must name that option.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -290,7 +290,7 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockNode:
     """Apply settings in order. Lists and blocks are replaced, not merged.
 
-    Raises ConfigError if a key's parent is no block.
+    Raises ConfigError if a key's parent is not a block.
     """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     copies: dict[int, BlockNode] = {}

@@ -28,7 +28,7 @@ class Identify(Recorded):
     """Estimation problem of `walkerlab identify`."""
 
     data: Text = key(
-        "", "", "file with the measured walk", bounds="a path, from the current folder", default_in_words="none"
+        "", "", "file with the measured walk", bounds="a path, relative to the current folder", default_in_words="none"
     )
     level: Literal["steps", "angles"] = key(
         "steps", "", "steps: period (and length and touch angle if measured) of each step; angles: leg angles over time"

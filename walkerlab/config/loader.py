@@ -100,7 +100,7 @@ def load(
     changes = (*(earlier for earlier in file.changes if key_of(earlier) not in keys), *new)
     if changed.name != base.name:
         folder = run_name(changed.name, new)
-    elif file.text is not None and not new:  # an unchanged run keeps its folder, however that is named
+    elif file.text is not None and not new:  # an unchanged run keeps its folder, whatever its name
         folder = file.path.name
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
@@ -267,7 +267,7 @@ def check_ground(case: analyses.Case, config: schema.Config, lines: BlockNode) -
 
 
 def tree_of(block: Mapping[str, Any], position: Position) -> BlockNode:
-    """Convert plain (or NumPy) values by key to a tree, all at one position."""
+    """Convert plain (or NumPy) values by key to a tree whose nodes all have the same position."""
 
     def node(value: Any) -> Node:
         if isinstance(value, Mapping):

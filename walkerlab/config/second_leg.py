@@ -82,8 +82,7 @@ class SecondPushOff(Block):
 
 
 def states_second_leg(config: Any) -> bool:
-    """Whether a config has keys for leg 2 or its push-off. A walker whose type has no `leg_2` counts as one that
-    has."""
+    """Whether a config has keys for leg 2 or its push-off. Also true for a walker whose type has no key `leg_2`."""
     return getattr(config.walker, "leg_2", ...) is not None or config.push_off.leg_2 is not None
 
 

@@ -82,7 +82,7 @@ def validate_tree(tree: BlockNode) -> schema.Config:
 
 
 class FollowingValue(NamedTuple):
-    """Value of a start that follows from others."""
+    """Start value that is computed from other values of the config."""
 
     name: str
     value: float
@@ -240,7 +240,10 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
 
 
 def advise_extensions() -> str:
-    """Return the part of an advice that names extensions, since one of them may add the missing word."""
+    """Return the end of an error message, which lists the installed extensions.
+
+    Another extension may add the missing word.
+    """
     names = ", ".join(found.name for found in external_extensions() if found.extension) or "none"
     return f", or a word of an extension: install the one that adds it (installed: {names})"
 

@@ -22,7 +22,7 @@ def to_yaml(config: schema.Config) -> str:
 
 
 def to_extending_yaml(start: str, base: schema.Config, changed: schema.Config, name: str) -> str:
-    """Write only the keys that differ from `base` as YAML that extends `base` by the name `start`."""
+    """Return YAML that extends `start`, the file or built-in name of `base`, by the keys that differ from it."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
     degrees = slope_in_degrees(changed.slope_rad)

@@ -69,7 +69,8 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         *HEADLINES["contact-sim"], *WALK_QUANTITIES, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
-"""All numbers that a stage may compute at a point of a sweep, written as in `HEADLINES`. Other stages may have any."""
+"""All quantities that a stage may compute at a point of a sweep, written as in `HEADLINES`. A stage that is not listed
+may compute any."""
 LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
     "last_step_period_s": "step_periods_s",
     "last_step_length_m": "step_lengths_m",

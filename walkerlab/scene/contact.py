@@ -171,7 +171,7 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
         return rigid_step_length_m
     if contact.pad_pitch == "own":
         if own_pitch_m is None:
-            raise ValueError("pad_pitch: own needs the contact gait's step length")
+            raise ValueError("pad_pitch=own requires the step length of the contact gait")
         return own_pitch_m
     return float(contact.pad_pitch)
 
@@ -226,7 +226,8 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
 # Tolerances for maps. They give the same map as the config's tolerances, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
-MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and factor on those of the unchanged start
+# evaluations per cell: a minimum, and a multiple of the number that the unchanged start takes
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4
 
 
 def build_scaled_starts(

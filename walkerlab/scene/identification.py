@@ -70,7 +70,7 @@ class Fixed(NamedTuple):
     value: float  # 0 for properties of clock and sensors
     scale: float  # typical change
     unit: str
-    slope: Floats  # (values,) derivative of the predicted values with respect to a change by the scale
+    slope: Floats  # (values,) derivative of the predicted values with respect to the parameter divided by `scale`
 
     @property
     def measured(self) -> bool:
@@ -93,14 +93,15 @@ LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over 
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
 PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
-NEAR_CONFIG: Final = 2.0  # loss of log-likelihood, two standard errors, below which estimates agree with the config
+# Estimates agree with the config if its values lower the log-likelihood by less than this (two standard errors).
+NEAR_CONFIG: Final = 2.0
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
 RARE_GAIN: Final = 1e-3  # a gain is not due to chance if it is less probable than this under the right model
 REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
 UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
-"""Parameters whose values are not doubted."""
+"""Parameters whose values count as exact."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -154,12 +155,12 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None =
 
 
 def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
-    """Return the number of steps from the state of the subject to the start of `step_map_of`."""
+    """Return the number of steps from the subject's state to the state at which the map of `step_map_of` starts."""
     return ((leg or subject.first_leg) - subject.first_leg) % family.stride
 
 
 def gait_start(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> Floats:
-    """Return the gait's section coordinates (d,) at the start of `step_map_of`."""
+    """Return the section coordinates (d,) of the gait where the map of `step_map_of` starts."""
     p: Any = family.start
     return step_map_of(subject, family).step(subject.z, p).z if steps_before(subject, family, leg) else subject.z
 
@@ -196,7 +197,7 @@ def identify_walk(
 
 
 def rank(answer: Identification) -> tuple[bool, float]:
-    """Return a sort key: results that fit are better than others, then those of higher likelihood."""
+    """Return a sort key: results that fit rank above the others, and among equals the higher likelihood wins."""
     verdict = answer.models[0]
     return verdict.usable, verdict.log_likelihood or -math.inf
 
@@ -233,7 +234,7 @@ def identify_beginning(
 ) -> Identification | str:
     """Fit a model to a walk that begins with a step of `measured.first_leg`. Returns the same as `identify_with`."""
     problem = problem_of(subject, measured, question)
-    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
+    # Periods alone cannot tell kicks from floor heights, and only the rigid map has derivatives with respect to kicks.
     kicked = subject.model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
@@ -397,7 +398,7 @@ def independent_errors(fitted: Fitted) -> Floats:
 
 
 def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
-    """Yield the distance of each prior from the estimate by the walk alone, in standard errors of the difference."""
+    """Yield each prior's distance from the estimate based on the walk alone, in standard errors of the difference."""
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
@@ -420,9 +421,9 @@ def suggest_parameter(
     """Yield advice on a fixed parameter or nuisance that would explain the walk better if it were estimated, too, or
     that would alone explain it as well as the estimates do.
 
-    A parameter that was measured is doubted as soon as it explains steps better that contradict the config. Otherwise,
-    and for parameters such as gravity or a spring that the config does not have, the gain must be too large to be due
-    to chance.
+    If the estimates from steps disagree with the config, but not widely, a measured parameter is doubted as soon as
+    estimating it explains the steps better. Otherwise, and for parameters such as gravity or a spring that the config
+    does not have, the gain must be too large to be due to chance.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
@@ -461,8 +462,8 @@ def describe_change(other: Fixed, change: float) -> str:
 
 
 def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
-    """Return the loss of log-likelihood, to second order, if all estimates but the most helpful one had the config's
-    values.
+    """Return the smallest loss of log-likelihood, to second order, if all estimated parameters but one keep the
+    config's values and that one is fitted again.
     """
     count = len(keys)
     moved = fitted.u[:count] - np.array(fitted.problem.start) / fitted.forecast.scales
@@ -476,10 +477,10 @@ def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
 def changes_alone(
     subject: ModelUnderTest, keys: Sequence[str], others: Iterable[Fixed], fitted: Fitted
 ) -> Iterator[tuple[Any, Fixed, float]]:
-    """Yield fixed parameters of which a change alone explains a walk that contradicts the config.
+    """Yield each fixed parameter that explains a walk that contradicts the config, if it is the only one to change.
 
-    Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters, at
-    least two, keep the config's values.
+    Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters
+    keep the config's values. If there are fewer than two of them, nothing is yielded.
     """
     if (
         len(keys) < 2
@@ -488,7 +489,7 @@ def changes_alone(
         or distance_from_config(keys, fitted) < FAR_FROM_CONFIG
     ):
         return
-    # A likelihood-ratio test must not reject this single change in favour of the estimates, which are more parameters.
+    # A likelihood-ratio test must not prefer the estimates, which change more parameters, to this single change.
     enough = fitted.evaluation.likelihood - 0.5 * chdtri(len(keys) - 1, REJECTED)
     for other in others:
         problem = problem_for(subject, (other.name,), [UNBOUNDED], fitted.problem)
@@ -555,7 +556,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg. Other zeros stay."""
+    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg, for any other zero 0."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -582,7 +583,10 @@ def keys_read_by(model: str, config: Config) -> tuple[str, ...]:
 def fixed_parameters(
     subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
 ) -> Iterator[Fixed]:
-    """Yield each fixed parameter and each other nuisance, if walks can be predicted at changed values."""
+    """Yield every fixed parameter, and for angles every nuisance that is not estimated.
+
+    Parameters for which no walk can be predicted at changed values are left out.
+    """
     forecast = fitted.forecast
     count = len(question.keys)
     sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
@@ -602,7 +606,7 @@ def fixed_parameters(
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
-        # If a walk on one side ends early, only the exact differences can be one-sided.
+        # If the walk at the larger value ends early, the exact difference can still use the other side.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:

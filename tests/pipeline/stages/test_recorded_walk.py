@@ -128,7 +128,7 @@ def test_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
     read = walkerlab.read_walk(folder.artifact("simulate"))
     assert read.summary["steps"] == 4
     assert "mechanical_J" in read.content["trajectory"].variables
-    with pytest.raises(ConfigError, match=r"contains no walk over time"):
+    with pytest.raises(ConfigError, match=r"contains no samples of a walk"):
         walkerlab.read_walk(folder.artifact("fixedpoint"))
 
 

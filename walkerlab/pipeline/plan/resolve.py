@@ -23,7 +23,7 @@ class ResolvedRun:
 
     loaded: loader.LoadedConfig
     folder: RunFolder
-    extends: str  # config that a new one, written from this run's results, extends: a file or a built-in name
+    extends: str  # file or built-in name of the config that new configs with results of this run extend
 
 
 def resolve(
@@ -67,7 +67,7 @@ def resolve(
 
 
 def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str]]:
-    """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
+    """Return the file of a run's config and, in the form KEY OLD -> NEW, the changes made in it since the run.
 
     Keys that were set when the run was made are not compared.
     """
@@ -113,7 +113,7 @@ def refuse_invalid_parts(read: loader.LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     if not isinstance(read.config.walker, walkers.AssembledWalker):
         return
-    # Imported here, because mechanics take long to import, and only walkers of parts can be invalid.
+    # Imported here, because importing the mechanics takes long, and only walkers of parts can be invalid here.
     from walkerlab.scene.rigid import level_walker
 
     try:

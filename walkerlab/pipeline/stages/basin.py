@@ -31,7 +31,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqr
 REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
-FAILED = grid.UNREACHED - 1  # marks a cell whose walk fails, among numbers of attractors
+FAILED = grid.UNREACHED - 1  # stands for a failed walk in an array of attractor indices
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -64,7 +64,7 @@ def run(
     # Work units return floats, because a checkpoint can store only floats.
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
-    # The edge of the basin includes that between walks that fail and walks that go on without reaching an attractor.
+    # The edge also runs between walks that fail and walks that go on without reaching an attractor.
     edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:

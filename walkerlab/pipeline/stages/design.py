@@ -32,7 +32,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
 SOLVED: Final = newton.Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # step, relative to the range of the bounds, of difference quotients of largest disturbances
+DIFFERENCE: Final = 5e-3  # difference step for largest disturbances, as a fraction of the range between the bounds
 FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; at a coarser one, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
@@ -232,7 +232,7 @@ class Gaits:
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)
 
     def largest_disturbances(self, subject: ModelUnderTest, names: Collection[str]) -> dict[str, float]:
-        """Find the largest disturbances that a gait survives in steps of both legs, by the names of `LARGEST`."""
+        """Find the largest disturbances that a gait survives, whichever leg swings. `names` are keys of `LARGEST`."""
         gaits = subject.quick_by_leg()
         return {
             name: min(largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for gait in gaits)

@@ -107,7 +107,7 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """Bifurcation on a branch: the index of the branch's point before it, and the steps of the gait at it."""
+    """Bifurcation on a branch: the index of the last point before it, its kind and value, and the steps of its gait."""
 
     after: int
     kind: str
@@ -126,7 +126,10 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return, in a list, the flip where a branch begins, with its gait taken twice. It is empty without a flip."""
+    """Return a list with the flip where a branch begins, or an empty list if it does not begin at a flip.
+
+    The steps of the flip's gait are in it twice in a row, because gaits of the branch have twice as many.
+    """
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:

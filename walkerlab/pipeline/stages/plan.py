@@ -215,8 +215,8 @@ def walk_of(subject: ModelUnderTest, measured: measurements.MeasuredWalk, questi
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: analyses.Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain if `measured` quantities of the first steps are known, and which combinations are
-    open."""
+    """Return the standard errors of the parameters if `measured` quantities of the first steps are known, and the
+    combinations that stay undetermined."""
     noise = {
         measurements.STEP_PERIOD: plan.period_noise_s,
         measurements.STEP_LENGTH: plan.length_noise_m,

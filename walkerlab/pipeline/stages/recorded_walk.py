@@ -80,7 +80,7 @@ def read_artifact(path: Path) -> Recording:
         ) from None
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:
-        raise ConfigError(f"{path} contains no walk over time.", "Run it with outputs: [states, energies, forces].")
+        raise ConfigError(f"{path} contains no samples of a walk.", "Run it with outputs: [states, energies, forces].")
     columns = {TIME: np.asarray(group["time"], float)}
     units = {TIME: "s"}
     for name, variable in group.variables.items():

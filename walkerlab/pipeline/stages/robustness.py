@@ -82,7 +82,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "mean_steps": Label("1", "mean number of steps to failure, or a lower bound"),
         "walks": Label("1", "walks"),
         "capped": Label("1", "walks stopped at the maximum number of steps"),
-        "method": Label("", "method of the mean"),
+        "method": Label("", "how the mean was estimated"),
     },
     "sensitivity": {
         "of": Label("", "quantity of the gait"),
@@ -327,7 +327,7 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
 
 
 def parameters_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, of those requested or, if `requested` is None, of
+    """Return the dotted keys of the parameters that the model reads, among those `requested` or, if that is None, among
     all."""
     selection = parameter_keys(subject.config) if requested is None else requested
     return tuple(key for key in selection if model_reads(subject.model, subject.config, key))

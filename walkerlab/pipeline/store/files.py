@@ -172,7 +172,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # `read` allocates memory for the requested size, so it must not be the limit.
+        # `read` allocates memory for the size requested, so request the size of the file, not the limit.
         return file.read(status.st_size)
 
 
@@ -196,7 +196,7 @@ def remove_leftovers(folder: Path) -> list[Path]:
 
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""Pattern of texts that a spreadsheet would evaluate, by their first character."""
+"""Pattern of the first character of texts that a spreadsheet would evaluate as formulas."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 

@@ -136,7 +136,7 @@ def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
 
 
 def write_attributes(holder: Any, attributes: Mapping[str, Attribute]) -> None:
-    """Write attributes in order. Text is stored as UTF-8 of fixed length, as in every netCDF file."""
+    """Write attributes in order. Text is stored as UTF-8 of fixed length, like netCDF's ordinary text attributes."""
     for name, value in attributes.items():
         if isinstance(value, str):
             data = value.encode()
@@ -198,8 +198,8 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Return the names of a group's members by their addresses, because HDF5 would search the whole file for such a
-    name."""
+    """Map the address of each of a group's members to its name. HDF5 would search the whole file to find the name for
+    an address."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 

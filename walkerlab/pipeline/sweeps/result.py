@@ -31,7 +31,8 @@ STATUS_TEXTS: Final = {
 """Columns that every point has in addition to the stage's quantities."""
 STATE_NAMES: Final = ("state", "start_state", "final_state")
 MAX_REASON: Final = 500
-"""Maximum length of a reason. Text in files has a fixed length, so a long reason would take its room at every point."""
+"""Maximum length of a reason. Text in files has a fixed length, so one long reason would take up space at every point.
+"""
 
 
 class SweepVariable:
@@ -186,7 +187,7 @@ class Merge:
         return {"numerical_error": counts | largest}
 
     def variable(self, name: str) -> Variable:
-        """Return a variable over the points, and remove its column, because a second copy would take much memory."""
+        """Return a variable over the points and remove its column, because a second copy would take a lot of memory."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]

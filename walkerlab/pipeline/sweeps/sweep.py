@@ -157,7 +157,7 @@ class SweepRun:
         count = len(self.question)
         reporter = reporter or Silent()
         for key in unread_keys(self):
-            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
+            reporter.note(f"sweep: {self.question.stage} does not read {key}, so its results do not depend on it")
         files.make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
             runs.claim(self.folder, self.loaded.config)
