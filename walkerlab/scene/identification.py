@@ -694,14 +694,14 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
             return None
         z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
         stride = forecast.walks.stride
-        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)  # type: ignore[arg-type]
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)
         if not isinstance(gait, Cycle):
             return None
         radius = float(np.abs(gait.multipliers).max()) ** (1.0 / stride)
         values = (gait.period_s / stride, math.fsum(gait.lengths_m) / stride, radius)
         if units is None:
             return np.array(values)
-        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))  # type: ignore[arg-type]
+        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))
         return None if norms is None else np.array((*values, norms[0]))
 
     centre = quantities(0.0 * fitted.u)
