@@ -9,6 +9,7 @@ from walkerlab.physics.hybrid import contact_state, rigid_walk
 NO_EVENTS = {
     "MATERIAL", "PER_FOOT", "EVENT_FUNCTIONS", "NO_EVENT", "LEGS_TURN", "EVENT_ROWS", "FARTHEST_SLIDE",
     "NOT_DUE", "AT_PULSE_END", "STRAIGHT_KNEE", "ON_GROUND", "MIN_FLEXION", "AT_COMPRESSION", "START_ROUNDING",
+    "STEP_FIELDS",
 }  # fmt: skip
 
 
