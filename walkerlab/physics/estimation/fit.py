@@ -247,9 +247,8 @@ def noise_has_converged(rows: Reduced, before: Noise, after: Noise, leg_length_m
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < NOISE_TOLERANCE)
     change = np.abs(after.process - before.process)
     negligible = 1e-7 * np.array((leg_length_m, 1.0))
-    if same and np.all(change < NOISE_TOLERANCE * np.maximum(after.process, negligible)):
-        return True
-    return gain_of(rows, before, after) < LIKELIHOOD_TOLERANCE
+    settled = same and np.all(change < NOISE_TOLERANCE * np.maximum(after.process, negligible))
+    return bool(settled) or gain_of(rows, before, after) < LIKELIHOOD_TOLERANCE
 
 
 def gain_of(rows: Reduced, before: Noise, after: Noise) -> float:

@@ -151,11 +151,9 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     sets = np.broadcast_shapes(deviations.shape[:-1], process.shape[:-1])
     if sets and sets[0] > 1 and sets[0] * (count + fixed) ** 2 > MAX_MATRIX_ENTRIES:
         both = [np.broadcast_to(each, (*sets, each.shape[-1])) for each in (deviations, process)]
-        halves = [
-            Noise(measured, *disturbances.T)
-            for measured, disturbances in zip(*map(np.array_split, both, (2, 2)), strict=True)
-        ]
-        return Evaluation(*map(np.concatenate, zip(*(evaluate(rows, half) for half in halves), strict=True)))
+        pairs = zip(*map(np.array_split, both, (2, 2)), strict=True)
+        halves = (evaluate(rows, Noise(measured, *disturbances.T)) for measured, disturbances in pairs)
+        return Evaluation(*map(np.concatenate, zip(*halves, strict=True)))
     scaled = rows.fixed / deviations[..., rows.quantity][..., None]
     # The Cholesky factor of [[V, F], [F^T, F^T F + large]], with V the covariance of the rows in units of their noise
     # and F the fixed part, holds the determinant of V and V^-1/2 F.
