@@ -211,9 +211,8 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
         names += [(key, word) for key in WORDS for word in extension.words(key)]
         for name in names:
             if name in owners:
-                both = f"{owners[name]} and {found.origin}"
                 advice = "Uninstall one of the two, or ask its author for another name."
-                raise ConfigError(f"{both} both add the {' '.join(name)}.", advice)
+                raise ConfigError(f"{owners[name]} and {found.origin} both add the {' '.join(name)}.", advice)
             owners[name] = found.origin
         if found.reason:
             warn(f"extension {found.name} ({found.origin}) is left out: {found.reason}")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, check_against, check_value, key, meaning_error
 from walkerlab.extensions import origin_of, words
 
 MM_PER_M: Final = 1000.0
@@ -147,6 +147,16 @@ class Contact(Block):
         return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))
 
 
+def why_two_sources(heights: tuple[float, ...], roughness: float) -> str:
+    """Explain why heights cannot be combined with a roughness, or return '' if only one of them is given."""
+    return "cannot be combined with roughness_m: heights are either listed or drawn" if heights and roughness else ""
+
+
+def why_too_high(heights: tuple[float, ...]) -> str:
+    """Explain why heights are not allowed, or return '' if they are."""
+    return "must be numbers from -1e3 to 1e3" if any(abs(height) > 1e3 for height in heights) else ""
+
+
 class Footholds(Block):
     """Heights of the footholds, for uneven ground. The default is even ground."""
 
@@ -161,20 +171,8 @@ class Footholds(Block):
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 
-    _listed = check_against(
-        "heights_m",
-        "roughness_m",
-        lambda heights, roughness: (
-            "cannot be combined with roughness_m: heights are either listed or drawn" if heights and roughness else ""
-        ),
-    )
-
-    @field_validator("heights_m")
-    @classmethod
-    def _check_heights(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if any(abs(height) > 1e3 for height in value):
-            raise meaning_error("must be numbers from -1e3 to 1e3")
-        return value
+    _listed = check_against("heights_m", "roughness_m", why_two_sources)
+    _heights = check_value("heights_m", why=why_too_high)
 
     @property
     def even(self) -> bool:

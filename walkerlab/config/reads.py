@@ -234,11 +234,8 @@ class CheckConfig(FixedPointConfig, Protocol):
     def check(self) -> Check | None: ...
 
 
-class PlanConfig(FixedPointConfig, ContactConfig, Protocol):
+class PlanConfig(IdentifyConfig, Protocol):
     """Keys that `plan` reads."""
-
-    @property
-    def identify(self) -> Identify | None: ...
 
     @property
     def plan(self) -> Plan | None: ...

@@ -3,6 +3,7 @@
 from typing import Any, Literal
 
 from walkerlab.config.fields import Block, key
+from walkerlab.config.reads import flatten
 
 
 def second_leg(unit: str, least: float | None = None) -> Any:
@@ -89,11 +90,7 @@ def describe_second_leg(walker: Any) -> str:
     """Describe the keys of leg 2 that a config states, with their values, or return '' if it states none."""
     leg = getattr(walker, "leg_2", None)
     keys = {} if leg is None else leg.model_dump(exclude_none=True)
-    stated = []
-    for name, value in keys.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        stated += [f"{f'{name}.{key}' if key else name}: {each}" for key, each in inner.items()]
-    return ", ".join(stated)
+    return ", ".join(f"{name}: {value}" for name, value in flatten(keys))
 
 
 def lock_knee(thigh: Any, shank: Any) -> dict[str, float]:

@@ -57,8 +57,7 @@ def name_key(meaning: str) -> Any:
 
 
 def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -> Any:
-    bounds = f"blocks of {number}{', '.join(of.model_fields)}"
-    return key(default, "", meaning, bounds=bounds, sequence=True)
+    return key(default, "", meaning, bounds=f"blocks of {number}{', '.join(of.model_fields)}", sequence=True)
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
@@ -105,8 +104,7 @@ class _Legged(Block):
     @property
     def lean_rad(self: Any) -> float:
         """Angle (rad) from the line of a leg to the line from hip to foot centre, or 0 for walkers of parts."""
-        ahead = getattr(self, "foot_centre_ahead_m", 0.0)
-        return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
+        return math.atan2(getattr(self, "foot_centre_ahead_m", 0.0), self.leg_length_m - self.foot_radius_m)
 
     def swing_angle(self: Any, stance_rad: float) -> float | None:
         """Return the angle (rad) at which leg 1 touches the ground behind leg 2, which stands at `stance_rad`.

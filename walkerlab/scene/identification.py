@@ -149,8 +149,7 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None =
         from walkerlab.physics.orbits.contact_map import ContactMap
 
         scene = scene_for(subject.length_m)
-        site = scene(subject.config)
-        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, site, swing)
+        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config), swing)
     step_map.stride = family.stride
     return step_map
 
@@ -182,7 +181,8 @@ def identify_walk(
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
-    results = [identify_with(model, config, measured, gait, question, note, begin) for model in question.models]
+    subjects = (find_model_gait(model, config, gait, note) for model in question.models)
+    results = [identify_with(subject, measured, question, begin) for subject in subjects]
     answers = [result for result in results if isinstance(result, Identification)]
     verdicts = tuple(
         result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", (result,))
@@ -203,20 +203,13 @@ def rank(answer: Identification) -> tuple[bool, float]:
 
 
 def identify_with(
-    model: str,
-    config: Config,
-    measured: MeasuredWalk,
-    gait: Mapping[str, Any],
-    question: Identify,
-    note: Callable[[str], None],
-    begin: Begin,
+    subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
     """Fit one model, or return the reason as text if no walk of the model can be fitted.
 
     If it is not known which leg of two that differ swings first, both are tried.
     """
-    subject = find_model_gait(model, config, gait, note)
-    stride = ConfigFamily(config, question.keys).stride
+    stride = ConfigFamily(subject.config, question.keys).stride
     if stride == 1 or measured.first_leg is not None:
         answer = identify_beginning(subject, measured, question, begin)
         stated = FirstLeg(measured.first_leg, "statement", None) if stride > 1 and measured.first_leg else None
@@ -240,13 +233,12 @@ def identify_beginning(
     subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
     """Fit a model to a walk that begins with a step of `measured.first_leg`. Returns the same as `identify_with`."""
-    model = subject.model
     problem = problem_of(subject, measured, question)
     # Periods alone cannot tell kicks from floor heights, and only the rigid map has derivatives with respect to kicks.
-    kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
+    kicked = subject.model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
-        fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
+        fit(problem, start, begin(f"{subject.model} model, start {number} of {question.starts}", MAX_ROUNDS))
         for number, start in enumerate(fit_starts(problem, question.starts), 1)
     ]
     predicted = [result for result in fits if result is not None]
@@ -265,11 +257,10 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
     Return None if the data are a table of steps or if the fit fails.
     """
     forecast = first.forecast
-    u = first.u
     if not forecast.measured.sampled:
         return None
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
-    start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
+    start = first.u if nuisances == forecast.nuisances else np.append(first.u, 0.0)
     problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
     fitted = fit(problem, start, begin("angles at their times", MAX_ROUNDS))
     return fitted if fitted is not None and not fitted.reason else None
@@ -279,7 +270,6 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family, measured.first_leg)
     z = gait_start(subject, family, measured.first_leg)
-    directions = effective_directions(walks, z, family.start)
     forecast = Forecast(
         measured=measured,
         nuisances=question.sensors,
@@ -287,13 +277,12 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
         admits=family.admits,
         scales=family.scales(),
         z=z,
-        directions=directions,
+        directions=effective_directions(walks, z, family.start),
     )
     bounds = [question.fit.get(key) or UNBOUNDED for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
     leg_m = subject.config.walker.leg_length_m
-    loss = question.loss
-    return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
+    return FitProblem(forecast, leg_m, family.start, bounds, priors, question.loss, question.max_walks)
 
 
 def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
@@ -340,7 +329,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     if verdict[0] in USABLE:
         others = (other_leg, fixed) if len(left_open) < len(keys) else ()
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
-        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
+        strong = (describe_pull(pull) for pull in pulls if pull.standard_deviations > STRONG_PULL)
+        reasons = (*verdict[1], *strong, *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
     elif second_leg and verdict[0] == "misfit" and (describe_limp(steps) or describe_limp(best)):
         verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
@@ -391,11 +381,10 @@ def leg_differences(
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
     """Yield, for each estimate at a bound, how far the data would move it, in standard errors of the free estimate."""
-    problem = fitted.problem
     scales = fitted.forecast.scales
     errors = independent_errors(fitted)
     for key, u, move, error, bounds, scale in zip(
-        keys, fitted.u, fitted.evaluation.move, errors, problem.bounds, scales, strict=False
+        keys, fitted.u, fitted.evaluation.move, errors, fitted.problem.bounds, scales, strict=False
     ):
         for bound in bounds:
             if abs(u * scale - bound) <= AT_BOUND * scale:
@@ -417,10 +406,6 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
-
-
-def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
-    return tuple(pull for pull in pulls if pull.standard_deviations > STRONG_PULL)
 
 
 def describe_pull(pull: Pull) -> str:
@@ -536,9 +521,8 @@ def gain_of_freeing(
     free = fit(wider, np.insert(fitted.u, count, other.value / other.scale))
     if free is None or free.reason:
         return 0.0, 0.0
-    return float(free.evaluation.likelihood - fitted.evaluation.likelihood), float(
-        free.u[count]
-    ) - other.value / other.scale
+    gain = float(free.evaluation.likelihood - fitted.evaluation.likelihood)
+    return gain, float(free.u[count]) - other.value / other.scale
 
 
 def problem_for(
@@ -603,11 +587,10 @@ def fixed_parameters(
 
     Parameters for which no walk can be predicted at changed values are left out.
     """
-    config = subject.config
     forecast = fitted.forecast
     count = len(question.keys)
     sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
-    family = ConfigFamily(config, (*question.keys, *fixed))
+    family = ConfigFamily(subject.config, (*question.keys, *fixed))
     wide = replace(
         forecast,
         walks=step_map_of(subject, family, forecast.measured.first_leg),
@@ -619,7 +602,7 @@ def fixed_parameters(
     u = np.concatenate((fitted.u[:count], values / wide.scales[count:], fitted.u[count:], np.zeros(len(sensors))))
     indices = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
     scales = [*wide.scales[count:].tolist(), *(NUISANCES[name][1] for name in sensors)]
-    units = [*(parameter_of(key, config).unit for key in fixed), *map(unit_by_name, sensors)]
+    units = [*(parameter_of(key, subject.config).unit for key in fixed), *map(unit_by_name, sensors)]
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
@@ -711,14 +694,14 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
             return None
         z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
         stride = forecast.walks.stride
-        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)  # type: ignore[arg-type]
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)
         if not isinstance(gait, Cycle):
             return None
         radius = float(np.abs(gait.multipliers).max()) ** (1.0 / stride)
         values = (gait.period_s / stride, math.fsum(gait.lengths_m) / stride, radius)
         if units is None:
             return np.array(values)
-        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))  # type: ignore[arg-type]
+        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))
         return None if norms is None else np.array((*values, norms[0]))
 
     centre = quantities(0.0 * fitted.u)

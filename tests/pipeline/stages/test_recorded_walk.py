@@ -207,7 +207,7 @@ def test_missing_rows_are_an_error_with_their_position(tmp_path, begin, end, why
     assert "8 samples per step" in refusal.value.advice
 
 
-def test_few_missing_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
+def test_gap_of_a_few_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
     head, *rows = table(simulated("rigid")).splitlines()
     kept = [row for row in rows if not 1.0 < float(row.split(",")[0]) < 1.05 and float(row.split(",")[0]) < 4.0]
     time, angles = kept[-1].split(",", 1)

@@ -50,9 +50,8 @@ class Keys:
         """
         once = {} if again else {"again": False}
         dependencies = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
-        return Identity(
-            stage.name, dependencies, input_keys, self.code_digest(stage.name, added_code(stage, dependencies))
-        )
+        code_digest = self.code_digest(stage.name, added_code(stage, dependencies))
+        return Identity(stage.name, dependencies, input_keys, code_digest)
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
         """Return the digest of a stage's code and of the code of extensions that it uses. It is computed at the first
@@ -169,8 +168,7 @@ class FolderResults:
         """
         origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
-        path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, origin.finish())
+        stored = artifact.write(self.run.artifact(step.stage.name), answer, step.identity, origin.finish())
         checkpoint.forget()
         return stored
 

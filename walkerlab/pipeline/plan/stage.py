@@ -37,11 +37,6 @@ def nothing(_config: object) -> tuple[Any, ...]:
     return ()
 
 
-def no_dependencies(_config: object) -> Mapping[str, Any]:
-    """Return an empty mapping, for stages whose results depend only on config, inputs and code."""
-    return {}
-
-
 def dependency(name: str, code: str) -> "Callable[[Config], Mapping[str, Any]]":
     """Return a function of the config that returns {name: value}, where `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
@@ -129,7 +124,7 @@ class Stage:
     early_with: tuple[str, ...] = ()  # stages whose results suffice for a partial drawing while others still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     # returns, by name, whatever else the result depends on, such as files (digests) and other programs (versions)
-    depends_on: "Callable[[Config], Mapping[str, Any]]" = no_dependencies
+    depends_on: "Callable[[Config], Mapping[str, Any]]" = lambda _config: {}
     checks: "Callable[[Config], object]" = nothing  # raises ConfigError for a config with which no command should run
     # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
     adds_command: str = ""

@@ -90,10 +90,7 @@ def compile_lanes(config: Config) -> None:
 
 
 PARTS: tuple[Callable[[Config], None], ...] = (
-    *(
-        partial(compile_model, method)
-        for method, compile_model in product(COMPILED_METHODS, (compile_contact, compile_rigid))
-    ),
+    *(partial(model, method) for method, model in product(COMPILED_METHODS, (compile_contact, compile_rigid))),
     compile_plain_systems,
     compile_lanes,
 )

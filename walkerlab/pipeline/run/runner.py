@@ -148,9 +148,8 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
     # A path in `extends` is relative to the file that contains it.
     typed = run.extends if run.extends in files.builtin_names() else os.path.relpath(run.extends, report.run_dir)
-    return write_numbered(
-        report.run_dir / f"{name}.yaml", writer.to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
-    )
+    text = writer.to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
+    return write_numbered(report.run_dir / f"{name}.yaml", text)
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:

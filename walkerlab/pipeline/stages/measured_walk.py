@@ -56,9 +56,7 @@ SAME_TOUCHES: Final = 0.002  # rad; smaller changes of the sum of leg angles at 
 
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the data file's content, so that a changed file makes results outdated."""
-    if config.identify is None:
-        return {}
-    return {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
+    return {} if config.identify is None else {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
 
 
 class MeasuredFile:

@@ -421,10 +421,9 @@ def last_stride(walk: WalkRecord) -> dict[str, Any]:
         return {}
     count = walk.steps - walk.steps % STRIDE  # even, because leg 1 swings in the first step of a stride
     periods, lengths = (values[count - STRIDE : count].tolist() for values in (walk.periods_s, walk.lengths_m))
+    steps = zip(periods, lengths, strict=True)
     return {
-        "gait_steps": [
-            {"period_s": period, "length_m": length} for period, length in zip(periods, lengths, strict=True)
-        ],
+        "gait_steps": [{"period_s": period, "length_m": length} for period, length in steps],
         "step_period_s": sum(periods) / STRIDE,
         "step_length_m": sum(lengths) / STRIDE,
         "asymmetry": {"step_length": asymmetry_of(*lengths), "step_period": asymmetry_of(*periods)},

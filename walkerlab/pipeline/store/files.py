@@ -107,8 +107,7 @@ def write_through(path: Path, data: bytes) -> None:
     Links are followed, never replaced. Raises StorageError if the file cannot be written.
     """
     with storing(path):
-        special = path.exists() and not stat.S_ISREG(path.stat().st_mode)
-        if special:
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):
             path.write_bytes(data)
             return
     write_atomically(path.resolve(), data)
@@ -180,13 +179,11 @@ def read_bounded(path: Path, limit: int) -> bytes:
 def file_digest(path: Path) -> str | None:
     """Return the sha256 of a file, or None if it cannot be read. Pipes and devices are not read, as they might never
     end."""
-    try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return None
+    with contextlib.suppress(OSError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+    return None
 
 
 def remove_leftovers(folder: Path) -> list[Path]:

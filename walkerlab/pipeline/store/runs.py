@@ -204,11 +204,10 @@ def stored_in(folder: RunFolder) -> list[str]:
 
 def config_of(folder: RunFolder) -> schema.Config | None:
     """Return the config of a run, or None if it is unknown or this version's schema rejects it."""
-    try:
+    with contextlib.suppress(ConfigError):
         tree = read_text(config_text(folder) or "", "stored config")
         return validation.validate_tree(tree) if isinstance(tree, BlockNode) else None
-    except ConfigError:
-        return None
+    return None
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:

@@ -83,16 +83,14 @@ def local(options: EngineOptions) -> WorkerPool:
 def environment_of_workers() -> Iterator[None]:
     """Make processes that start in the `with` block use one thread and import nothing from the current folder."""
     changes = dict.fromkeys((*ONE_THREAD, "PYTHONSAFEPATH"), "1")
-    before = {name: os.environ.get(name) for name in changes}
+    before = {name: os.environ[name] for name in changes.keys() & os.environ.keys()}
     os.environ.update(changes)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in changes.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
 
 
 @contextlib.contextmanager
@@ -119,9 +117,8 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
         # computed again, as in every engine.
         size = options.workers or max(1, len(client.nthreads()))
         # By default, Dask gives equal calls the same result, so a second attempt would get the error of the first.
-        executor = JobExecutor(
-            functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
-        )
+        submit = functools.partial(client.submit, retries=0, pure=False)
+        executor = JobExecutor(submit, size, None if workers is None else workers.wait)
         try:
             yield executor
         finally:
@@ -165,10 +162,9 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     parameters: dict[str, Any] = {name: number_or_text(text) for name, text in options.options.items()}
     cluster = str(parameters.pop("cluster", "slurm"))
     python = parameters.pop("python", None)
+    interpreter = {"slurm_python": python} if python else {}
     try:
-        job_runner = submitit.AutoExecutor(
-            private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
-        )
+        job_runner = submitit.AutoExecutor(private_jobs_folder(options.folder), cluster=cluster, **interpreter)
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
     # submitit checks the types of options by assertions.
     except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
@@ -310,11 +306,9 @@ class JobExecutor(SizedExecutor):
             try:
                 if self._wait_for is not None:
                     self._wait_for(job)
-                result = job.result()
+                future.set_result(job.result())
             except BaseException as error:  # the error of a cancelled job need not be an Exception
                 future.set_exception(error)
-            else:
-                future.set_result(result)
             self.jobs.discard(job)
 
         threading.Thread(target=wait, daemon=True).start()
