@@ -49,7 +49,7 @@ MAX_FOLDERS: Final = 500
 class Study:
     """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
 
-    own_walker: str  # function that tells whether a config has the walker of the study
+    own_walker: str  # function that returns whether a config has the walker of the study
     # functions that build a rigid model with other equations, by value of the config key `equations`
     equations: Mapping[str, str] = field(default_factory=dict)
 

@@ -174,7 +174,7 @@ def changes_of(base: schema.Config, changed: schema.Config, slope_deg: float | N
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
     differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
-    # A key that is null in a new block is no change if the block was null before.
+    # A key that is null in a new block does not count as a change if the block was null before.
     absent = {f"{key}." for key, value in values_before.items() if value is None}
     differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:
