@@ -90,8 +90,7 @@ class Result:
         start = f"{type(self).__name__} of {self.stage} has no value {name!r}"
         if self.no_answer is not None:
             return f"{start}: {self.no_answer}."
-        holders = [group for group in self.groups if name in self.content[group].variables]
-        if holders:
+        if holders := [group for group in self.groups if name in self.content[group].variables]:
             return f"{start}, but an array: dataset({holders[0]!r}).{name}"
         names = ", ".join(headline_values(self.stage, self.summary))
         return f"{start}.{suggestion(name, self._values) or f' It has {names} and more in `summary` and `groups`.'}"
@@ -226,15 +225,12 @@ class Gait(Result):
         def stable(self) -> bool: ...
 
 
-RESULTS: dict[str, type[Result]] = {"fixedpoint": Gait}
-"""Class of the results of a stage, where it is not `Result`."""
-
-
 def result_of(
     stage: str, summary: Mapping[str, Value], content: Content, no_answer: NoAnswer | None, path: Path | None = None
 ) -> Result:
     message = None if no_answer is None else no_answer.message
-    return RESULTS.get(stage, Result)(stage, summary, content, message, path)
+    kind = Gait if stage == "fixedpoint" else Result
+    return kind(stage, summary, content, message, path)
 
 
 def dataset(group: Group) -> "Dataset":
@@ -251,7 +247,7 @@ def dataset(group: Group) -> "Dataset":
         name: (variable.dims, variable.values, {"units": variable.units, "long_name": variable.long_name})
         for name, variable in group.variables.items()
     }
-    result: Dataset = xarray_here().Dataset(data, attrs=dict(group.attrs))
+    result: Dataset = optional_module("xarray", "a Dataset").Dataset(data, attrs=dict(group.attrs))
     return result.set_coords(str(group.attrs.get("coordinates", "")).split())
 
 
@@ -260,15 +256,11 @@ def dataframe(group: Group) -> "DataFrame":
 
     Raises ConfigError if pandas is not installed.
     """
-    try:
-        import pandas
-    except ImportError as error:
-        raise ConfigError("a DataFrame needs pandas, which is not installed.", "pip install pandas") from error
-    sizes = {
-        dim: size for one in group.variables.values() for dim, size in zip(one.dims, one.values.shape, strict=True)
-    }
-    labels = {dim: group.variables[dim].values if dim in group.variables else range(sizes[dim]) for dim in sizes}
-    arrays = {name: variable for name, variable in group.variables.items() if name not in sizes}
+    pandas = optional_module("pandas", "a DataFrame")
+    variables = group.variables
+    sizes = {dim: size for one in variables.values() for dim, size in zip(one.dims, one.values.shape, strict=True)}
+    labels = {dim: variables[dim].values if dim in variables else range(sizes[dim]) for dim in sizes}
+    arrays = {name: variable for name, variable in variables.items() if name not in sizes}
     shared = [dim for dim in sizes if all(dim in variable.dims for variable in arrays.values())]
     columns: dict[str, NDArray[np.generic]] = {}
     units: dict[str, str] = {}
@@ -281,17 +273,17 @@ def dataframe(group: Group) -> "DataFrame":
             columns[column], units[column] = part, variable.units
     index = pandas.MultiIndex.from_product([labels[dim] for dim in shared], names=shared)
     # The labels of a MultiIndex are tuples, even if it has one level.
-    frame = pandas.DataFrame(columns, index.get_level_values(0) if len(shared) == 1 else index)
+    frame: DataFrame = pandas.DataFrame(columns, index.get_level_values(0) if len(shared) == 1 else index)
     frame.attrs["units"] = units
     return frame
 
 
-def xarray_here() -> ModuleType:
-    """Import xarray.
+def optional_module(name: str, what: str, title: str = "") -> ModuleType:
+    """Import the module `name` (in messages `title`), without which `what` cannot be made.
 
     Raises ConfigError if it is not installed.
     """
     try:
-        return importlib.import_module("xarray")
+        return importlib.import_module(name)
     except ImportError as error:
-        raise ConfigError("a Dataset needs xarray, which is not installed.", "pip install xarray") from error
+        raise ConfigError(f"{what} needs {title or name}, which is not installed.", f"pip install {name}") from error

@@ -10,15 +10,13 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
-from walkerlab.api.results import Result, Setting, dataset, result_of, xarray_here
+from walkerlab.api.results import Result, Setting, dataset, optional_module, result_of
 from walkerlab.config import files, schema
 from walkerlab.config.analyses import Sweep as SweepBlock
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
-from walkerlab.pipeline.plan import graph, planner
-from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.plan import graph, planner, resolve
 from walkerlab.pipeline.run.runner import Options, run_and_write
 from walkerlab.pipeline.store import artifact, content
-from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.runs import RunFolder, config_of, run_named
 
 if TYPE_CHECKING:
@@ -54,8 +52,7 @@ class Run:
     folder: RunFolder
 
     def __repr__(self) -> str:
-        names = [*self.stages, *self.sweeps]
-        return f"Run in {self.folder.path}: {', '.join(names) or 'no results'}"
+        return f"Run in {self.folder.path}: {', '.join((*self.stages, *self.sweeps)) or 'no results'}"
 
     @property
     def config(self) -> schema.Config:
@@ -63,8 +60,7 @@ class Run:
 
         Raises StaleError if it cannot be determined.
         """
-        config = config_of(self.folder)
-        if config is None:
+        if (config := config_of(self.folder)) is None:
             raise StaleError(f"{self.folder.path} has no result with a readable config.")
         return config
 
@@ -114,7 +110,7 @@ class Run:
             return dataset(artifact.read(path)[""])
         except FileNotFoundError:
             raise StaleError(f"{self.folder.path} has no sweep {name}.", f"Choose from {', '.join(names)}.") from None
-        except Damaged as error:
+        except artifact.Damaged as error:
             raise StaleError(f"{path} is damaged: {error}.", "Run the same sweep again to rebuild it.") from error
 
 
@@ -150,7 +146,7 @@ def run(
     True
     """
     check_stage(stage)
-    resolved = resolve(str(config), set_options(set), strides, folder_of(runs), name)
+    resolved = resolve.resolve(str(config), set_options(set), strides, folder_of(runs), name)
     warn(resolved.loaded.warnings)
     report = run_and_write(resolved, stage, Options(force=force, jobs=jobs))
     return result_of(stage, report.as_json(), report.content or content.Content(), report.no_answer, report.artifact)
@@ -207,8 +203,8 @@ def sweep(
     from walkerlab.pipeline.sweeps.question import build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-    xarray_here()  # fail before the sweep runs if xarray is missing
-    resolved = resolve(str(config), set_options(set), runs=folder_of(runs), name=name)
+    optional_module("xarray", "a Dataset")  # fail before the sweep runs if xarray is missing
+    resolved = resolve.resolve(str(config), set_options(set), runs=folder_of(runs), name=name)
     warn(resolved.loaded.warnings)
     if not isinstance(over, Mapping):
         raise ConfigError(f"over: {over!r} is not a mapping of keys to values.", 'For example {"slope_deg": [1, 2]}.')
@@ -219,9 +215,8 @@ def sweep(
     seed = block.seed if combined.get("seed") is None else combined["seed"]
     question = build_sweep(stage, listed, combined.get("zip") or False, combined.get("sample") or "", seed)
     chosen, address = parse_engine(engine)
-    engine_options = EngineOptions(
-        jobs, address, modules_of(stage, resolved.loaded.config, graph.PIPELINE), resolved.folder.path
-    )
+    modules = modules_of(stage, resolved.loaded.config, graph.PIPELINE)
+    engine_options = EngineOptions(jobs, address, modules, resolved.folder.path)
     swept = SweepRun(question, resolved.loaded, resolved.folder).run(SweepWork(chosen, engine_options))
     if swept.failed:
         raise swept.error()

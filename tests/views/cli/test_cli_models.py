@@ -4,8 +4,8 @@ import pytest
 
 from walkerlab.errors import NoAnswer
 from walkerlab.exchange.export import ENDINGS
-from walkerlab.views.cli import models
-from walkerlab.views.cli.exports import Target
+from walkerlab.pipeline.run import runner
+from walkerlab.views.cli.exports import Target, write_model
 from walkerlab.views.cli.request import Request
 
 
@@ -69,9 +69,9 @@ def test_model_that_cannot_be_written_gives_one_message(walker, arguments, messa
 
 def test_walker_without_a_gait_is_not_exported(tmp_path, monkeypatch):
     answer = NoAnswer("no gait", "advice")
-    monkeypatch.setattr(models, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
+    monkeypatch.setattr(runner, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
     with pytest.raises(NoAnswer):
-        models.write_model("paper", Request("export", runs=tmp_path, quiet=True), Target("adm", tmp_path / "x.adm"))
+        write_model("paper", Request("export", runs=tmp_path, quiet=True), Target("adm", tmp_path / "x.adm"))
     assert not list(tmp_path.glob("x.*"))
 
 

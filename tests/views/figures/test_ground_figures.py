@@ -6,11 +6,10 @@ from synthetic_walks import WEIGHT, both_models, contact, stored, without
 
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.canvas import figure_style
-from walkerlab.views.figures.ground import FIGURES, losses
 from walkerlab.views.figures.style import CONTACT_LOOK
-from walkerlab.views.figures.walks import walk_of
+from walkerlab.views.figures.walks import GROUND, losses, walk_of
 
-FORCES, LOST = FIGURES
+FORCES, LOST = GROUND
 
 
 def plotted(figure, results):

@@ -75,7 +75,7 @@ def swept(count=5):
 def test_sweep_figure_shows_both_models_and_names_the_least_sensitive_gait():
     illustration = robustness.sweep_illustration(swept(), ("slope_deg",))
     assert illustration.heading == "Figure 17. Robustness over one parameter"
-    assert illustration.alt_text.startswith("Four stacked plots")
+    assert illustration.say("seen").startswith("Four stacked plots")
     drawing = illustration.render({})
     assert "The rigid model's least sensitive gait is at 2 deg, with a norm of 20 s/m" in drawing.caption
     assert "The contact model's least sensitive gait is at 2 deg, with a norm of 21 s/m" in drawing.caption

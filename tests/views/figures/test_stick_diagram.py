@@ -9,8 +9,7 @@ from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact
 
 from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.stick_diagram import (
-    FIGURE_2,
-    FIGURE_6,
+    FIGURES,
     FILM_NEEDS,
     entries,
     film_times,
@@ -21,6 +20,7 @@ from walkerlab.views.figures.stick_diagram import (
 from walkerlab.views.figures.style import LEGS, VERMILLION
 
 ROUNDING = 1e-12
+FIGURE_2, FIGURE_6 = FIGURES
 
 
 @pytest.fixture(params=["simulate", "contact-sim"])

@@ -165,7 +165,7 @@ def plotted(folder):
         files = {kind: f"{figure.name}.{kind}" for kind in ("svg", "png")}
         (folder / files["svg"]).write_bytes(drawing.svg)
         (folder / files["png"]).write_bytes(drawing.png)
-        figures.append({"title": figure.title, "caption": drawing.caption, "alt": figure.alt_text, **files})
+        figures.append({"title": figure.title, "caption": drawing.caption, "alt": figure.say("seen"), **files})
     return stored("plot", {}, {"figures": figures})
 
 

@@ -96,7 +96,7 @@ def answer_to(path: Path, settings: Sequence[str], request: Request) -> dict[str
 
 def print_answer(answer: dict[str, Any], first: bool) -> None:
     from walkerlab.evidence.check.section import answer as in_blocks
-    from walkerlab.views.report.answers import lay_out
+    from walkerlab.views.report.tables import lay_out
 
     lines = [*([] if first else [""]), f"{answer['name']} ({answer['file']})", *lay_out(in_blocks(answer))]
     print("\n".join(map(escape_controls, lines)))

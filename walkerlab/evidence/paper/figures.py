@@ -145,6 +145,6 @@ def draw_limit(results: Results) -> Drawn:
 
 
 FIGURES = (
-    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, walks.STEPS_TAKEN_RIGID), draw_differences),
+    paper_figure(8, (RAW_ERRORS, ALIGNED_ERRORS, walks.STEPS_TAKEN[RIGID_STAGE]), draw_differences),
     paper_figure(12, (LIMIT_NEED,), draw_limit),
 )

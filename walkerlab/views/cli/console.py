@@ -5,7 +5,7 @@ import contextlib
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,11 +117,7 @@ class Console:
         """Report the running stages whenever nothing has been printed for a while."""
         while not end.wait(0.5):
             if time.monotonic() - self._said_at >= MAX_SILENCE_S:
-                self._say("; ".join(line.describe() for line in self._lines()))
-
-    def _lines(self) -> "Iterator[StageLine]":
-        with self._lock:
-            yield from tuple(self.running)
+                self._say("; ".join(line.describe() for line in tuple(self.running)))
 
     def _show_bars(self) -> None:
         if self._live is not None:
@@ -139,7 +135,7 @@ class Console:
         from rich.text import Text
 
         bars = Table.grid(padding=(0, 1))
-        for line in self._lines():
+        for line in tuple(self.running):
             bar = ProgressBar(line.total, line.done, width=20, pulse=line.total is None)
             bars.add_row(Text(line.work()), bar, Text(line.pace()))
         return bars
@@ -183,11 +179,10 @@ class StageLine:
         return self.label if self.label.startswith(self.stage) else f"{self.stage}: {self.label}"
 
     def pace(self) -> str:
-        elapsed = time.monotonic() - self.began
         parts = [f"{self.done} of {self.total}"] if self.total is not None and self.total > 1 else []
-        remaining = self.seconds_left()
-        parts.append(f"{elapsed:.0f} s")
-        parts += [] if remaining is None else [f"about {remaining:.0f} s left"]
+        parts.append(f"{time.monotonic() - self.began:.0f} s")
+        if (remaining := self.seconds_left()) is not None:
+            parts.append(f"about {remaining:.0f} s left")
         return ", ".join(parts)
 
     def seconds_left(self) -> float | None:

@@ -1,4 +1,4 @@
-"""Export figures, tables and trajectories as files for other programs, and walks as GIF or MP4."""
+"""Export figures, tables, trajectories and models as files for other programs, and walks as GIF or MP4."""
 
 import io
 import re
@@ -71,8 +71,7 @@ class Target:
             raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
         if path.exists() and any(file.exists() and path.samefile(file) for file in self.inputs):
             raise ConfigError(f"{path} is an input of this command.", another)
-        owner = runs.owner_of(path, graph.PIPELINE.names)
-        if owner is not None:
+        if (owner := runs.owner_of(path, graph.PIPELINE.names)) is not None:
             raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
 
@@ -178,11 +177,8 @@ def page_tables(folder: runs.RunFolder) -> dict[str, Table]:
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
     short = [caption_name(block.caption) for block in tables]
-    unique = [name not in TABLES and short.count(name) == 1 for name in short]
-    return {
-        name if is_unique else hyphenate(block.caption): block
-        for name, is_unique, block in zip(short, unique, tables, strict=True)
-    }
+    alone = {name for name in short if name not in TABLES and short.count(name) == 1}
+    return {name if name in alone else hyphenate(each.caption): each for name, each in zip(short, tables, strict=True)}
 
 
 def find_item(folder: runs.RunFolder, name: str) -> "Illustration | Table":
@@ -300,8 +296,7 @@ def trajectory(folder: runs.RunFolder, model: str, kind: str, console: Console) 
     """
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
-    group = stored.groups.get(TRAJECTORY)
-    if group is None:
+    if (group := stored.groups.get(TRAJECTORY)) is None:
         raise StaleError("the walk was stored without a trajectory.", OUTPUTS_ADVICE)
     if kind == "nc":
         # Imported here, because CSV needs no HDF5.
@@ -321,6 +316,57 @@ def trajectory(folder: runs.RunFolder, model: str, kind: str, console: Console) 
             for place, values in enumerate(variable.values.T.tolist()):
                 columns[add_unit(f"{name} {place + 1}", variable.units)] = values
     return files.csv_text(list(columns), zip(*columns.values(), strict=True))
+
+
+def write_model(
+    run: str, request: Request, target: Target, law: str | None = None, slope: str = "gravity"
+) -> list[Path]:
+    """Write a model of the walker of a run or config, and return the files written. A missing gait is computed first.
+
+    run    run or config
+    law    contact law in a model for ADAMS; None for its default
+    slope  what is tilted in a model for MuJoCo: gravity, or the geometry
+
+    Raises ConfigError for an unknown run or format, or if a format cannot express the walker, and NoAnswer if the
+    walker has no gait.
+    """
+    # Imported here, because only models need a walker and its gait.
+    from walkerlab.exchange.export import ENDINGS, export_model, parse_law, parse_slope
+    from walkerlab.exchange.exported import GaitStart
+    from walkerlab.pipeline.run.runner import Options, execute
+    from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
+    from walkerlab.pipeline.store.provenance import git_commit
+
+    resolved = resolve.resolve(run, request.settings, runs=request.runs)
+    console = request.console
+    config = resolved.loaded.config
+    folder = resolved.folder
+    for warning in resolved.loaded.warnings:
+        console.warn(warning)
+    resolve.warn_of_edits(config, folder, console.warn)
+    # MuJoCo's viewer opens only files that end in .xml.
+    named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
+    to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
+    path, ending = replace(target, to=to).choose_file("a model", folder.name, list(ENDINGS))
+    kind = ENDINGS[ending]
+    adams_law = parse_law(law or "contact")
+    if law is not None and kind == "mjcf":
+        raise ConfigError("--law chooses between contact laws of ADAMS.", "Leave it out for MuJoCo.")
+    inputs = {}
+    if config.start == "fixed-point":
+        report = execute(config, "fixedpoint", folder, Options(), console)
+        if report.no_answer is not None:
+            raise report.no_answer
+        assert report.content is not None, "a stage with an answer stores it"
+        inputs["fixedpoint"] = report.content
+    start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
+    exported = export_model(config, start, kind, adams_law, git_commit(), path.stem, parse_slope(slope))
+    for omission in exported.left_out:
+        console.note(f"left out: {omission}")
+    paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]
+    for extra in paths[1:]:
+        target.refuse(extra, extra.suffix.removeprefix("."))
+    return [write_file(file, text.encode(), console) for file, text in zip(paths, exported.files.values(), strict=True)]
 
 
 @dataclass(frozen=True)
@@ -345,9 +391,8 @@ def walk_in(folder: runs.RunFolder, model: str | None = None) -> str:
     Raises ConfigError if the stage `model` simulates no walk.
     """
     if model is not None and model not in MODEL_NAMES:
-        raise ConfigError(
-            f"--model {model} is not a stage that simulates a walk.", f"Choose from {', '.join(MODEL_NAMES)}."
-        )
+        names = ", ".join(MODEL_NAMES)
+        raise ConfigError(f"--model {model} is not a stage that simulates a walk.", f"Choose from {names}.")
     rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)
@@ -373,8 +418,7 @@ def write_film(folder: runs.RunFolder, target: Target, film: Film, console: Cons
     with results_to_show(folder, [shown, *behind], console.warn) as results:
         walk, *others = (the_result(results, folder, model) for model in (shown, *behind))
         for model in (shown, *behind):
-            reason = FILM_NEEDS[model].missing_in(results, {})
-            if reason is not None:
+            if (reason := FILM_NEEDS[model].missing_in(results, {})) is not None:
                 raise StaleError(f"the walk cannot be drawn: {reason}.", OUTPUTS_ADVICE)
         sticks = read_sticks(walk)
         other = read_sticks(others[0]) if others else None

@@ -52,12 +52,9 @@ def show(
         from walkerlab.pipeline.store.runs import run_named
         from walkerlab.views.cli.stored import print_stored
 
-        located = (
-            replace(request_for_stage, config=run_named(runs[0], request_for_stage.runs).explicit_path)
-            if runs
-            else request_for_stage
-        )
-        print_stored(located, stage)
+        if runs:
+            request_for_stage = replace(request_for_stage, config=run_named(runs[0], request.runs).explicit_path)
+        print_stored(request_for_stage, stage)
 
 
 def schema(
@@ -140,8 +137,7 @@ def draw_both(folders: "tuple[RunFolder, RunFolder]", results: list[dict[str, An
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import draw_runs
 
-    images = draw_runs(results[0], results[1], run_labels(folders))
-    if images is None:
+    if (images := draw_runs(results[0], results[1], run_labels(folders))) is None:
         return []
     make_folder(folders[0].figures)
     paths = [folders[0].figures / f"diff-{folders[1].name}.{kind}" for kind in ("svg", "png")]
@@ -175,12 +171,8 @@ def comparison_lines(
         return number(value, DIGITS) if isinstance(value, float) and not every else format_value(value)
 
     names = run_labels(folders)
-    result = [
-        "config",
-        *aligned([["", *names], *([key, format_value(a), format_value(b)] for key, a, b in comparison.config)]),
-    ]
-    if not comparison.config:
-        result[1:] = ["  the same"]
+    changed = [[key, format_value(a), format_value(b)] for key, a, b in comparison.config]
+    result = ["config", *(aligned([["", *names], *changed]) if changed else ["  the same"])]
     unlisted = 0
     for stage, pairs in comparison.numbers.items():
         differing = [pair for pair in pairs if differs(pair)]
@@ -197,9 +189,7 @@ def comparison_lines(
 
 
 def differs(pair: "Pair") -> bool:
-    if pair.change is not None:
-        return abs(pair.change) > SAME_CHANGE
-    return bool(pair.first != pair.second)
+    return abs(pair.change) > SAME_CHANGE if pair.change is not None else bool(pair.first != pair.second)
 
 
 def percent(pair: "Pair") -> str:

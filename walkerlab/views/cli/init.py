@@ -55,9 +55,8 @@ def write_config(file: Path, walker: str, checks: bool = False) -> str:
         write_atomically(file, text.encode())
     except StorageError as error:
         reason = getattr(error.__cause__, "strerror", None) or error.message
-        raise StorageError(
-            f"{file} could not be written: {reason}.", "Choose a file in a writable folder with free space."
-        ) from error
+        message = f"{file} could not be written: {reason}."
+        raise StorageError(message, "Choose a file in a writable folder with free space.") from error
     return f"wrote {file}, with its schema next to it; next: {following}"
 
 

@@ -61,8 +61,7 @@ def open_run(request: Request, run: RunArgument = "paper") -> None:
     folder = run_named(run, request.runs)
     page = (folder.path / "report.html").resolve()
     if not page.is_file():
-        advice = f"`walkerlab report -c {folder.quoted_path}` writes it."
-        raise StaleError(f"{folder.path} has no page yet.", advice)
+        raise StaleError(f"{folder.path} has no page yet.", f"`walkerlab report -c {folder.quoted_path}` writes it.")
     request.console.show(page)
     print(page)
 
@@ -83,9 +82,7 @@ def export(
     what: Annotated[str, typer.Argument(metavar="WHAT", help=ITEM_EXAMPLES)],
     to: Annotated[
         str | None,
-        typer.Option(
-            "--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."
-        ),
+        typer.Option(metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."),
     ] = None,
     output: Output = None,
     columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns of a figure or a LaTeX table.")] = 1,
@@ -107,12 +104,9 @@ def export(
     ] = None,
 ) -> None:
     """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
-    from walkerlab.views.cli.exports import Target
+    from walkerlab.views.cli.exports import Target, export_from, run_to_export, walk_in, write_model
 
     if what == "model":
-        # Imported here: only this export needs a walker.
-        from walkerlab.views.cli.models import write_model
-
         for path in write_model(run, request, Target(to, output), law, slope or "gravity"):
             print(path)
         return
@@ -120,8 +114,6 @@ def export(
         raise typer.BadParameter("changes only a model", param_hint="--slope")
     if request.sets:
         raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
-    from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
-
     folder = run_to_export(run, request)
     target = Target(to, output, columns=columns, width=width, dpi=dpi)
     print(export_from(folder, what, target, walk_in(folder, model), request.console))
@@ -130,7 +122,7 @@ def export(
 def draw(
     request: Request,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
-    to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
+    to: Annotated[str | None, typer.Option(metavar="FORMAT", help="svg, pdf or png.")] = None,
     output: Output = None,
 ) -> None:
     """Draw a config's walker to scale, with dimensions labelled by their config keys."""
@@ -141,7 +133,7 @@ def draw(
 
 def explore(
     request: Request,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
 ) -> None:
     """Serve an interactive page with a slider for every parameter (Ctrl-C stops it)."""
@@ -169,9 +161,7 @@ def explore(
 def animate(
     request: Request,
     run: RunArgument,
-    to: Annotated[
-        str | None, typer.Option("--to", metavar="FORMAT", help="gif, mp4 (needs ffmpeg), or a file name.")
-    ] = None,
+    to: Annotated[str | None, typer.Option(metavar="FORMAT", help="gif, mp4 (needs ffmpeg), or a file name.")] = None,
     output: Output = None,
     model: Annotated[
         str | None,

@@ -79,7 +79,10 @@ class SetByOption(str):
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
-    """Declare a field of a request that commands may offer as an option. `flags` and `about` are typer's arguments."""
+    """Declare a field of a request that commands may offer as an option. `flags` and `about` are typer's arguments.
+
+    Without flags, the option has the name of the field.
+    """
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
@@ -103,13 +106,13 @@ class Request:
     sets: list[str] | None = option(
         "--set", metavar="KEY=VALUE", help="Change one key of the config; may be repeated.", autocompletion=keys_to_set
     )
-    strides: int | None = option("--strides", metavar="N", help="Strides to walk; one stride is two steps.")
+    strides: int | None = option(metavar="N", help="Strides to walk; one stride is two steps.")
     name: str | None = option(
-        "--name", metavar="NAME", help="Name of the run's folder; default: derived from the config and its changes."
+        metavar="NAME", help="Name of the run's folder; default: derived from the config and its changes."
     )
-    runs: Path = option("--runs", default=RUNS, metavar="DIR", help="Folder of all runs.")
+    runs: Path = option(default=RUNS, metavar="DIR", help="Folder of all runs.")
     jobs: int | None = option(
-        "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
+        metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
     force: bool = switch("--force", help="Recompute the stage and all it needs, even if up to date.")
     dry_run: bool = switch("--dry-run", help="Show what would be done and why, but change nothing.")
@@ -169,16 +172,10 @@ class Request:
         from walkerlab.pipeline.plan.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
-        loaded = run.loaded
-        for warning in loaded.warnings:
+        for warning in run.loaded.warnings:
             self.console.warn(warning)
-        self.console.detail(f"config: {loaded.source}; run folder: {run.folder.path}")
+        self.console.detail(f"config: {run.loaded.source}; run folder: {run.folder.path}")
         return run
-
-    @property
-    def run_dir(self) -> Path | None:
-        """Folder of the run, or None if it is not resolved yet."""
-        return self.folder.path if "resolved_run" in vars(self) else None
 
     @property
     def loaded(self) -> "LoadedConfig":
@@ -213,7 +210,8 @@ def exit_on_failure(request: Request) -> Iterator[None]:
     def fail(error: WalkerlabError) -> typer.Exit:
         """Print a failure and, with `--json`, an object that describes it, and return the exit that it causes."""
         if request.as_json:
-            run_dir = None if request.run_dir is None else str(request.run_dir)
+            # The failure may be that the run could not be resolved.
+            run_dir = str(request.folder.path) if "resolved_run" in vars(request) else None
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
             print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})
         print_error(error, request.typed_for)
@@ -331,7 +329,6 @@ def bounds(option: "Option", values: Sequence[str]) -> str:
 def pairs(option: "Option", values: Sequence[str]) -> str:
     """Convert NAME=VALUE,... arguments to YAML. A unit without NAME applies to all quantities of its kind."""
     # Imported here, because few commands read files of other programs.
-    from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
 
     try:

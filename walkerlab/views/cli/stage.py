@@ -37,7 +37,8 @@ def report_on(request: Request, stage: Stage) -> None:
     if options.dry:
         value = value | {"dry_run": True}
         error = None
-        lines = plan_lines(report)
+        rows = [[done.stage.name, done.action, done.reason] for done in report.steps]
+        lines = [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
     else:
         lines = report_lines(request, report)
         if request.open_page and "html" in report.summary and not request.console.shown:
@@ -53,10 +54,9 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice", "reason")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:
-        page = (report.run_dir / str(own["html"])).resolve()
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
         details = f"`walkerlab show STAGE{request.typed_for('show')}` lists every value"
-        where = ["", f"page: {page}", f"next: {shows}; {details}."]
+        where = ["", f"page: {(report.run_dir / str(own['html'])).resolve()}", f"next: {shows}; {details}."]
         rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
@@ -73,12 +73,6 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         figures = draw_at_once(report.stage, report.content, report.run_dir, anew=not report.reused)
         lines += [f"figure: {path}" for path in figures]
     return [*lines, *omission_lines(request, report)]
-
-
-def plan_lines(report: StageReport) -> list[str]:
-    """Describe what would be computed."""
-    rows = [[done.stage.name, done.action, done.reason] for done in report.steps]
-    return [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
 
 
 def omission_lines(request: Request, report: StageReport) -> list[str]:

@@ -49,9 +49,7 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         }
         for step in steps
     ]
-    folders = (
-        [folder] if listed is None else [runs.RunFolder.open_folder(path) for path in sorted(request.runs.glob("*/"))]
-    )
+    folders = [folder] if listed is None else [*map(runs.RunFolder.open_folder, sorted(request.runs.glob("*/")))]
     working = {place.path: worker for place in folders if (worker := place.worker()) is not None}
     status: dict[str, Any] = {
         "run_dir": str(folder.path),
@@ -92,16 +90,16 @@ def state_of(step: Step) -> str:
     return "missing" if step.found is None else "stale"
 
 
-def explain_state(step: Step) -> str:
-    """Say why a result has its state, or return '' if that needs no explanation."""
-    return "" if step.reason in (artifact.NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
-
-
 def explain_states(steps: Sequence[Step]) -> Iterator[str]:
-    """Explain the state of each stage. If several stages have the same reason, all but the first refer to the first."""
+    """Say why each stage's result has its state, or yield '' if that needs no explanation.
+
+    If several stages have the same reason, all but the first refer to the first.
+    """
     first: dict[str, str] = {}
     for step in steps:
-        reason = executor.short_reason(explain_state(step)) if step.action == "leave out" else explain_state(step)
+        is_obvious = step.reason in (artifact.NOT_THERE, UP_TO_DATE)
+        reason = "" if is_obvious else step.reason.removeprefix(f"{state_of(step)}: ")
+        reason = executor.short_reason(reason) if step.action == "leave out" else reason
         yield f"as {first[reason]}" if reason in first else reason
         if reason:
             first.setdefault(reason, step.stage.name)
@@ -221,10 +219,8 @@ def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
     """Return a line for each file, but only one line for all figures of a run and for all chunks of a sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:
-        stem = {runs.CHUNKS: f"{path.stem.rpartition('-')[0]}-*", runs.FIGURES_FOLDER: "*"}.get(
-            path.parent.name, path.name
-        )
-        lines.setdefault(str(path.parent / stem), []).append(path)
+        patterns = {runs.CHUNKS: f"{path.stem.rpartition('-')[0]}-*", runs.FIGURES_FOLDER: "*"}
+        lines.setdefault(str(path.parent / patterns.get(path.parent.name, path.name)), []).append(path)
     return [
         line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
         for line, paths in lines.items()
@@ -247,10 +243,8 @@ def rerun_artifact(path: Path, request: Request) -> None:
     name = path.resolve().parent.name
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
-        report = runner.execute(
-            config, stage, runs.RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph
-        )
-    recomputed = report.content
+        folder = runs.RunFolder(Path(scratch), name)
+        recomputed = runner.execute(config, stage, folder, reporter=request.console, graph=request.graph).content
     before = stored.digest()
     after = None if recomputed is None else recomputed.digest()
     same_code = recomputed is not None and recomputed.identity.key == stored.identity.key

@@ -27,38 +27,33 @@ class SweepRequest(Request):
     """Options of a sweep."""
 
     over: list[str] | None = option(
-        "--over", metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
+        metavar="KEY=VALUES", help="A parameter: FROM:TO:N, FROM:TO:N:log or [a, b, ...]; may be repeated."
     )
-    stage: str | None = option("--stage", metavar="NAME", help="The stage to run.")
+    stage: str | None = option(metavar="NAME", help="The stage to run.")
     zipped: bool = switch(
         "--zip", help="Combine the n-th values into the n-th point, instead of forming the full grid."
     )
-    sample: str | None = option(
-        "--sample", metavar="SAMPLER:N", help="Sample points instead: latin-hypercube:500, sobol:512."
-    )
-    seed: int | None = option("--seed", metavar="N", min=0, help="Seed of the sampled points; default: 1.")
-    engine: str = option(
-        "--engine", default="local", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm."
-    )
+    sample: str | None = option(metavar="SAMPLER:N", help="Sample points instead: latin-hypercube:500, sobol:512.")
+    seed: int | None = option(metavar="N", min=0, help="Seed of the sampled points; default: 1.")
+    engine: str = option(default="local", metavar="NAME", help="Where to compute: local, dask[=ADDRESS] or slurm.")
     engine_option: list[str] | None = option(
-        "--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
+        metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
     )
     at_once: int = option(
         "--jobs", default=0, metavar="N", min=0, help="Chunks computed simultaneously; 0: all cores, on Slurm 16."
     )
     chunk_seconds: float | None = option(
-        "--chunk-seconds", metavar="S", help="Target duration of a chunk; default: depends on the engine."
+        metavar="S", help="Target duration of a chunk; default: depends on the engine."
     )
-    show: list[str] | None = option("--show", metavar="NAME", help="Quantity to plot; may be repeated.")
-    against: str | None = option(
-        "--against", metavar="NAME", help="Quantity on the horizontal axis; default: the swept parameters."
-    )
+    show: list[str] | None = option(metavar="NAME", help="Quantity to plot; may be repeated.")
+    against: str | None = option(metavar="NAME", help="Quantity on the horizontal axis; default: the swept parameters.")
     as_csv: bool = switch(
         "--csv", help="Print the points with their headline values as CSV, and store that next to the result."
     )
 
 
-SWEEP_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
+OWN_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
+SHARED = (*OWN_FIELDS, *RUN_OPTIONS, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS)
 
 
 def sweep(request: SweepRequest) -> None:
@@ -108,9 +103,7 @@ def sweep(request: SweepRequest) -> None:
             flags = {flag: name for flag, name in quantities.items() if name not in question.names}
             check_options(question.stage, flags, available)
 
-        seconds = request.chunk_seconds
-        waits = not request.no_wait
-        work = SweepWork(engine, engine_options, seconds, waits, request.force, check)
+        work = SweepWork(engine, engine_options, request.chunk_seconds, not request.no_wait, request.force, check)
         swept = run.run(work, request.console)
     show_result(request, swept)
 
@@ -194,8 +187,4 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
     ]
 
 
-COMMANDS = (
-    Offer(
-        sweep, (*SWEEP_FIELDS, *RUN_OPTIONS, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest
-    ),
-)
+COMMANDS = (Offer(sweep, SHARED, asks=SweepRequest),)

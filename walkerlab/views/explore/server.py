@@ -52,22 +52,19 @@ class Job:
         self._process: subprocess.Popen[str] | None = None
         self._runs = Path()
         self._lock = threading.Lock()
-        self._status: dict[str, Any] = {"running": False}
+        # Latest progress message and, as soon as the file exists, its address. A change replaces the dictionary.
+        self.status: dict[str, Any] = {"running": False}
 
     def begin(self, kind: object, question: ExploredConfig) -> Answered:
         """Start a job, or return status 409 while another one runs."""
         if kind not in KINDS:
             raise TypeError
         with self._lock:
-            if self._status["running"]:
+            if self.status["running"]:
                 return 409, {"error": {"message": "another export is running", "advice": "Wait until it has finished."}}
-            self._status = {"running": True, "kind": kind, "progress": ""}
+            self.status = {"running": True, "kind": kind, "progress": ""}
         threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
-        return 200, dict(self._status)
-
-    def progress(self) -> dict[str, Any]:
-        """Return the latest progress message and, as soon as the file exists, its address."""
-        return dict(self._status)
+        return 200, self.status
 
     def close(self) -> None:
         """End the running job and its child processes."""
@@ -91,9 +88,9 @@ class Job:
                 folder = Path(self._command(walk, *of_config)["run_dir"])
                 file = folder / f"{walk}.gif"
                 self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
-            self._status = {"running": False, "kind": kind, "url": self._url(file)}
+            self.status = {"running": False, "kind": kind, "url": self._url(file)}
         except (RuntimeError, OSError, KeyError, ValueError) as error:
-            self._status = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+            self.status = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
 
     def _url(self, file: Path) -> str:
         return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
@@ -114,9 +111,9 @@ class Job:
                 assert self._process.stderr is not None
                 for line in self._process.stderr:
                     lines.append(line.strip())
-                    self._status = {**self._status, "progress": line.strip()}
+                    self.status = {**self.status, "progress": line.strip()}
                     if (early := EARLY_PAGE.search(line)) is not None:
-                        self._status = {**self._status, "url": self._url(Path(early[1]))}
+                        self.status = {**self.status, "url": self._url(Path(early[1]))}
                 status = self._process.wait()
             output.seek(0)
             printed = output.read()
@@ -364,7 +361,7 @@ class Handler(BaseHTTPRequestHandler):
                 html, policy = render_page(self.server.base)
                 return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
             if address.path == "/api/job":
-                return self.answer(200, self.server.job.progress())
+                return self.answer(200, self.server.job.status)
             runs = self.server.base.runs.resolve()
             file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
             if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():

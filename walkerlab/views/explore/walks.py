@@ -6,7 +6,7 @@ import shlex
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,8 +14,7 @@ from pydantic.fields import FieldInfo
 
 from walkerlab.config import fields, files, loader, schema, writer
 from walkerlab.errors import ConfigError, WalkerlabError
-from walkerlab.pipeline.plan.resolve import resolve
-from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.plan import resolve, results
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.content import Content, Group
@@ -74,10 +73,8 @@ def rank(key: str, first: Any) -> int | None:
     """Return the position of a key among those shown before any search, or None if only a search shows it."""
     if (key.startswith(DRIVE_BLOCKS) and not first) or key.startswith(("walker.hip.hinge_law", "walker.knee.")):
         return None
-    places = (
-        index for index, name in enumerate(INITIAL_KEYS) if key == name or (name[-1] == "." and key.startswith(name))
-    )
-    return next(places, None)
+    matches = [key == name or (name[-1] == "." and key.startswith(name)) for name in INITIAL_KEYS]
+    return matches.index(True) if any(matches) else None
 
 
 def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: schema.Config) -> dict[str, Any]:
@@ -220,7 +217,7 @@ class ExploredConfig:
 
         Raises ConfigError if it is invalid.
         """
-        return resolve(self.config, self.all_sets, None, self.runs).loaded
+        return resolve.resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refusal(self, error: WalkerlabError) -> Answered:
         """Describe why the config is invalid, and if possible name the change that made it so."""
@@ -236,10 +233,8 @@ def set_arguments(config: schema.Config) -> tuple[str, ...]:
     return tuple(f"{key}={json.dumps(value)}" for key, value in values if key != "name" and value != paper[key])
 
 
-@cache
-def memory() -> MemoryResults:
-    """Return the store for the results of earlier requests in this process."""
-    return MemoryResults()
+MEMORY = results.MemoryResults()
+"""Results of earlier requests in this process."""
 
 
 def walk(question: ExploredConfig) -> Answered:
@@ -249,7 +244,7 @@ def walk(question: ExploredConfig) -> Answered:
         config = loaded.config
         stages = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # The walks come first, because they store the gait, which then need not be found again.
-        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*stages, "fixedpoint")}
+        answers = {stage: answer_in_memory(config, stage, MEMORY, again=False) for stage in (*stages, "fixedpoint")}
     except ConfigError as error:
         return question.refusal(error)
     commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *stages)]
@@ -287,7 +282,7 @@ def follow_gaits(question: ExploredConfig) -> Answered:
     """
     try:
         config = question.loaded.config
-        answer = answer_in_memory(config, "continuation", memory(), again=False, reporter=GivingWay())
+        answer = answer_in_memory(config, "continuation", MEMORY, again=False, reporter=GivingWay())
     except ConfigError as error:
         return question.refusal(error)
     except SupersededError:
@@ -324,8 +319,7 @@ def config_text(question: ExploredConfig, name: str) -> str:
     Raises ConfigError if the config is invalid.
     """
     start = files.config_to_extend(question.config)
-    named = replace(question, changes={**question.changes, "name": name})
     base = loader.load(Path(start)).config
-    changed = named.loaded.config
+    changed = replace(question, changes={**question.changes, "name": name}).loaded.config
     same_type = base.walker.type == changed.walker.type
     return writer.to_extending_yaml(start, base, changed, name) if same_type else writer.to_yaml(changed)

@@ -6,8 +6,7 @@ import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import matplotlib
 import matplotlib.style
@@ -146,9 +145,6 @@ def break_lines(figure: Figure) -> None:
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 
-RASTER_KINDS = ("png", "tiff")
-
-
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
     """Return the figure as a file of one kind. `name` keeps the ids in an SVG different from those of other figures."""
     # Files of equal figures are equal to the byte, so they must not contain a date or a version.
@@ -162,12 +158,11 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
     file = io.BytesIO()
     # Without a salt, matplotlib would make ids from random numbers.
     with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(file, format=kind, dpi=dpi if kind in RASTER_KINDS else PNG_DPI, **undated[kind])
+        figure.savefig(file, format=kind, dpi=dpi if kind in ("png", "tiff") else PNG_DPI, **undated[kind])
     return file.getvalue()
 
 
-@dataclass(frozen=True)
-class Drawing:
+class Drawing(NamedTuple):
     """Files of a figure as bytes, and its caption."""
 
     svg: bytes

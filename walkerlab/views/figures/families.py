@@ -45,9 +45,8 @@ NEED: Final = Need(CONTINUATION_STAGE, "branches", ("model", "period", "from", "
 MODEL_COLOURS: Final = {"rigid": BLUE, "contact": ORANGE}
 BIFURCATION_MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
-POINTS_FROM_FLIP: Final = (
-    16  # number of points plotted between a flip and the first gait computed on the branch that starts there
-)
+POINTS_FROM_FLIP: Final = 16
+"""Number of points plotted between a flip and the first gait computed on the branch that starts there."""
 OTHER_GAITS: Final = GREEN
 """Colour of gaits outside the period-doubling cascade of the one-step gait."""
 
@@ -76,10 +75,9 @@ class DrawnBranch:
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
     """Yield the branches or curves (`name`) of each model, in the order in which they were followed."""
-    groups = results[CONTINUATION_STAGE].groups
     for model in MODEL_COLOURS:
         for number in count():
-            if (group := groups.get(f"{model}/{name}_{number}")) is None:
+            if (group := results[CONTINUATION_STAGE].groups.get(f"{model}/{name}_{number}")) is None:
                 break
             yield DrawnBranch(model, group)
 
@@ -370,9 +368,8 @@ def draw_plane(results: Results) -> Drawn:
     for curve in branches_of(results, "curve"):
         kind = str(curve.group.attrs["kind"])
         look = looks[curve.model, kind] = {"color": CURVE_COLOURS[curve.model], "linestyle": CURVE_STYLES[kind]}
-        axes.plot(
-            curve.group["value"], curve.group["second"], **look, linewidth=WIDTHS.get(curve.period, MIN_CURVE_WIDTH)
-        )
+        width = WIDTHS.get(curve.period, MIN_CURVE_WIDTH)
+        axes.plot(curve.group["value"], curve.group["second"], **look, linewidth=width)
         second = curve.group.variables["second"]
         axes.set_ylabel(label_of(axis_label(second.long_name), second.units))
     axes.set_xlabel(parameter_of(results))
@@ -385,10 +382,9 @@ def draw_plane(results: Results) -> Drawn:
 def region_kinds(regions: Group) -> list[Kind]:
     """Return colour, name and cells of each kind of attractor that occurs."""
     period = regions["period"]
-    other = (period > 0) & ~np.isin(period, list(DOUBLED))
     kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]
     kinds += [
-        (OTHER_PERIOD, "other number of steps", other),
+        (OTHER_PERIOD, "other number of steps", (period > 0) & ~np.isin(period, list(DOUBLED))),
         (APERIODIC, "aperiodic", period == 0),
         (NO_WALKING, "no walking", period < 0),
     ]

@@ -17,25 +17,19 @@ from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Resu
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 IDENTIFY_STAGE: Final = "identify"
-NO_MEASURED_STEPS: Final = "it has no steps"
 TWO_SIGMA: Final = 2.0
 STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
 LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
 PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
-MIN_NAMED_FRACTION: Final = (
-    0.1  # the name of a combination lists parameters whose change is at least this fraction of the largest one
-)
+MIN_NAMED_FRACTION: Final = 0.1
+"""The name of a combination lists parameters whose change is at least this fraction of the largest one."""
 
 
 def quantities(steps: Group) -> list[str]:
     """Return the names of the measured quantities: period, length, angle."""
     return sorted((name.removeprefix(MEASURED) for name in steps.variables if name.startswith(MEASURED)), reverse=True)
-
-
-def axis_name(quantity: str) -> str:
-    return label_of(axis_label(quantity), unit_by_name(quantity))
 
 
 def draw_steps(results: Results) -> Drawn:
@@ -53,7 +47,7 @@ def draw_steps(results: Results) -> Drawn:
         panel.fill_between(number, predicted - reach, predicted + reach, color=BLUE, alpha=0.2, linewidth=0.0)
         panel.plot(number, predicted, color=BLUE, linewidth=1.0)
         panel.plot(number, measured, linestyle="none", marker="o", markersize=3.0, color=BLACK)
-        panel.set_ylabel(axis_name(name))
+        panel.set_ylabel(label_of(axis_label(name), unit_by_name(name)))
         inside.append(np.abs(measured - predicted) <= reach)
     axes[-1, 0].set_xlabel("step")
     axes[-1, 0].xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -194,7 +188,7 @@ def draw_errors(results: Results) -> Drawn:
     return figure, (int(summary["max_steps"]), any("wanted" in parameter for parameter in entries))
 
 
-MEASURED_STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
+MEASURED_STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), "it has no steps")
 WORST = Need(IDENTIFY_STAGE, "worst", ("moves",), "fewer than two combinations of parameters are determined")
 PLANNED = Need("plan", "errors", ("standard_error",), "no errors were computed")
 FIGURES: Final = (

@@ -60,6 +60,7 @@ class Illustration:
     texts: Mapping[str, str] = field(default_factory=dict)
 
     def say(self, what: str, *values: Any) -> str:
+        """Return a text: title, caption or, as `seen`, the text alternative of one or two sentences, or ''."""
         if self.texts:
             return self.texts.get(what, "").format(*values)
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
@@ -67,11 +68,6 @@ class Illustration:
     @property
     def title(self) -> str:
         return self.say("title")
-
-    @property
-    def alt_text(self) -> str:
-        """Text alternative of one or two sentences, or ''."""
-        return self.say("seen")
 
     @property
     def stages(self) -> tuple[str, ...]:

@@ -52,12 +52,11 @@ def outcome_kinds(outcomes: Any) -> list[tuple[str, str]]:
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
     """Return the edges of cells midway between neighbouring values (at the geometric mean if the axis is
     logarithmic)."""
+    if centres.size == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
     scale = np.log(centres) if is_logarithmic(centres) else centres
-    if scale.size == 1:
-        scaled = np.array([scale[0] - 0.5, scale[0] + 0.5])
-    else:
-        middle = 0.5 * (scale[1:] + scale[:-1])
-        scaled = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
+    middle = 0.5 * (scale[1:] + scale[:-1])
+    scaled = np.concatenate([[2 * scale[0] - middle[0]], middle, [2 * scale[-1] - middle[-1]]])
     return np.exp(scaled) if is_logarithmic(centres) else scaled
 
 
@@ -223,10 +222,9 @@ class OverStiffness:
         self.edges = (edges(cells[STIFFNESS_AXIS]), edges(cells[up]))
         self.figure, (self.left, self.right) = canvas.panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
-        for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
-            axes.set(
-                xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS_AXIS), title=title, xlim=xlim, ylim=ylim
-            )
+        across = axis_of(cells, STIFFNESS_AXIS)
+        for axes, title in zip((self.left, self.right), titles, strict=True):
+            axes.set(xscale="log", yscale="log", xlabel=across, title=title, xlim=xlim, ylim=ylim)
             axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
@@ -244,8 +242,7 @@ class OverStiffness:
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
         for colour, _, where in others:
             if where.any():
-                alone = np.ma.masked_where(~where, np.ones(where.shape))
-                self.draw(self.right, alone, cmap=ListedColormap([colour]))
+                self.draw(self.right, np.ma.masked_where(~where, np.ones(where.shape)), cmap=ListedColormap([colour]))
 
 
 def draw_stiction(results: Results) -> Drawn:

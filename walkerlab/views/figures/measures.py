@@ -141,10 +141,9 @@ def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """Draw the walker's dimensions, and return the bytes of a file of this kind (svg, pdf, png). Equal walkers and
     names give equal bytes."""
-    title = f"Dimensions of a walker of type {walker.type}"
     with figure_style():
         figure = draw_parts(walker) if isinstance(walker, AssembledWalker) else draw_upright(walker)
-        return files_of(figure, name, title, [kind])[0]
+        return files_of(figure, name, f"Dimensions of a walker of type {walker.type}", [kind])[0]
 
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
@@ -189,14 +188,12 @@ def frame_leg(leg: UprightLeg) -> View:
     left = -LEFT_OF_LEG * length - CHARACTER_WIDTH * behind * width
     sizes = [LINE_SPACING * width * len(words.split("\n")) for words, *_ in labels]
     heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
-    top = max(leg.top, *heights) + 0.1 * length
-    return View(labels, heights, lanes, ahead, left, width, -0.16 * length, top)
+    return View(labels, heights, lanes, ahead, left, width, -0.16 * length, max(leg.top, *heights) + 0.1 * length)
 
 
 def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> None:
     """Draw an upright leg on the ground with its dimensions, and the other leg faintly behind it."""
     length = leg.joints[0][1]
-    line = leg.line
     ends = (view.left, view.left + view.width)
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=ends, ylim=(view.bottom, view.top))
@@ -211,7 +208,7 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
     draw_leg(axes, second, rotate(angles[-1], other.joints[-1], other.centre, second[-2]), other.radius, FAINT_GREY)
-    draw_leg(axes, line, leg.centre, leg.radius, BLACK)
+    draw_leg(axes, leg.line, leg.centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
     x = FIRST_LANE * length
     for lane, wide in zip(view.lanes, view.ahead, strict=True):
@@ -222,11 +219,10 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     for dimension in leg.lengths:
         if dimension.start[1] == dimension.end[1]:
             axes.plot(*np.transpose([dimension.start, dimension.end]), color=VERMILLION, linewidth=1.5)
+    x = -LEFT_OF_LEG * length
     for (words, colour, spot), height in zip(view.labels, view.heights, strict=True):
-        axes.plot([-LEFT_OF_LEG * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
-        axes.text(
-            -LEFT_OF_LEG * length, height, f"{words} ", color=colour, fontsize=LABEL_SIZE, ha="right", va="center"
-        )
+        axes.plot([x, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
+        axes.text(x, height, f"{words} ", color=colour, fontsize=LABEL_SIZE, ha="right", va="center")
     if leg.radius > SMALL_ARC * length:
         axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
 

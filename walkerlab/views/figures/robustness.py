@@ -60,8 +60,7 @@ def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration 
 
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
     """Whether a robustness sweep varies one parameter and has the variables of figure 17."""
-    names = (name.format(0) for _, name, _ in PANELS)
-    return len(parameters) == 1 and all(name in group.variables for name in names)
+    return len(parameters) == 1 and all(name.format(0) in group.variables for _, name, _ in PANELS)
 
 
 def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
@@ -145,9 +144,8 @@ def plot_rough_ground(results: Results) -> Drawn:
     heights.sharex(walk)
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
     strikes = strikes[strikes < sticks.time.size]
-    stick_diagram.draw_postures(
-        walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), stick_diagram.FAINT_WIDTH
-    )
+    between = np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64)
+    stick_diagram.draw_postures(walk, sticks, between, stick_diagram.FAINT_WIDTH)
     stick_diagram.draw_postures(walk, sticks, strikes, stick_diagram.BOLD_WIDTH)
     stick_diagram.draw_slope(walk, sticks)
     heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=style.GREY)
@@ -171,8 +169,7 @@ def draw_shares(axes: Axes, steps: Group) -> None:
             ended = np.sort(walks[walks < last])
             going = 1.0 - np.arange(ended.size + 1) / walks.size
             at = np.concatenate(([1.0], ended, [min(walks.max(), last)]))
-            share = np.append(going, going[-1])
-            axes.step(at, share, where="post", color=MODEL_COLOURS[str(model)], linestyle=dash)
+            axes.step(at, np.append(going, going[-1]), where="post", color=MODEL_COLOURS[str(model)], linestyle=dash)
     axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
 
 

@@ -11,13 +11,11 @@ from walkerlab.config.reads import NamedConfig
 from walkerlab.extensions import extensions, load
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.artifact import Identified, Stored
-from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store import artifact, content
 from walkerlab.pipeline.store.files import make_folder, storing, write_atomically
 from walkerlab.pipeline.store.runs import FIGURES_FOLDER
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.views.figures import families, ground, identification, maps, robustness, stick_diagram, walks
+from walkerlab.views.figures import families, identification, maps, robustness, stick_diagram, walks
 from walkerlab.views.figures.illustration import Illustration
 
 ADDED: tuple[Illustration, ...] = tuple(
@@ -26,7 +24,7 @@ ADDED: tuple[Illustration, ...] = tuple(
 NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES, *ADDED)
 FIGURES: tuple[Illustration, ...] = (
     *sorted((figure for figure in NUMBERED if figure.number is not None), key=lambda figure: figure.name),
-    *ground.FIGURES,
+    *walks.GROUND,
     *identification.FIGURES,
     *(figure for figure in ADDED if figure.number is None),
     *maps.STABILITY,
@@ -35,12 +33,12 @@ FIGURES: tuple[Illustration, ...] = (
 
 def run(
     _config: NamedConfig,
-    inputs: Mapping[str, Stored],
+    inputs: Mapping[str, artifact.Stored],
     progress: Progress,
     folder: Path,
     left_out: Sequence[LeftOut] = (),
-    early: Content | None = None,
-) -> Content:
+    early: content.Content | None = None,
+) -> content.Content:
     """Draw all figures whose results are available, and store them in the run's folder.
 
     left_out  results that are missing, with reasons
@@ -69,11 +67,11 @@ def run(
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # The texts count as timings, because some captions quote run times, which differ from run to run.
     summary = {"figures": drawn, "left_out": missing}
-    return Content({artifact.FILES_GROUP: artifact.index_files(folder, files)}, summary, timed=("figures",))
+    return content.Content({artifact.FILES_GROUP: artifact.index_files(folder, files)}, summary, timed=("figures",))
 
 
 def draw(
-    figure: Illustration, results: Mapping[str, Identified], folder: Path, name: str = ""
+    figure: Illustration, results: Mapping[str, artifact.Identified], folder: Path, name: str = ""
 ) -> dict[str, str | int | list[str]]:
     """Draw a figure, store it, and return its texts and the paths of its files relative to the run's folder.
 
@@ -85,11 +83,11 @@ def draw(
     write_atomically(folder / paths["svg"], drawing.svg)
     write_atomically(folder / paths["png"], drawing.png)
     number = {} if figure.number is None else {"number": figure.number}
-    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.alt_text}
+    words = {"title": figure.title, "caption": drawing.caption, "alt": figure.say("seen")}
     return {**number, **words, **paths, "results": list(figure.stages)}
 
 
-def draw_at_once(stage: str, result: Identified, folder: Path, anew: bool) -> list[Path]:
+def draw_at_once(stage: str, result: artifact.Identified, folder: Path, anew: bool) -> list[Path]:
     """Draw the figures that need only the result of `stage`, and return the paths of all SVG files.
 
     anew  whether to redraw figures that exist

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.pipeline.store.content import FAR_EDGE_M, Group, Variable, ground_levels
+from walkerlab.pipeline.store.content import FAR_EDGE_M, Group, ground_levels
 from walkerlab.views.figures import illustration, walks
 from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
@@ -52,12 +52,6 @@ ROOM_ABOVE = 1.05
 """Space (in) for the legend."""
 MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
-NO_STEPS = Group(
-    {
-        name: Variable(np.zeros(0), ("step",), unit, name)
-        for name, unit in ((walks.TOUCHES, "s"), ("touch_along_m", "m"))
-    }
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +134,8 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
     config = result.identity.config_slice
     trajectory = result[f"{under}trajectory"]
     walker = config["walker"]
-    steps = result.groups.get(f"{under}steps", NO_STEPS)
+    steps = result.groups.get(f"{under}steps", Group({}))
+    strikes = walks.touch_times(steps)
 
     def joints(name: str) -> walks.Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
@@ -159,7 +154,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
     pushes = config["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
     ending = outcome.label if outcome is not None and outcome.stumbled else ""
-    landings = np.append(0.0, steps["touch_along_m"])
+    landings = np.append(0.0, steps["touch_along_m"] if strikes.size else strikes)
     heights = np.zeros(landings.size)
     outline = None
     if levels is not None:
@@ -167,8 +162,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
         outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
     landings = np.column_stack((landings, heights))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps[walks.TOUCHES], landings, slope, knees, radii, head, outline,
-        pushes, ending,
+        trajectory["time"], hip, joints("foot"), strikes, landings, slope, knees, radii, head, outline, pushes, ending
     )  # fmt: skip
 
 
@@ -192,8 +186,7 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     left, right = left - widen, right + widen
     figure = blank(0.0)
     across = figure.get_figwidth() - SIDE_INCHES
-    lowest = sticks.project(seen)[..., 1].min()
-    bottom = min(bottom, lowest - ROOM_BELOW * (right - left) / across)
+    bottom = min(bottom, sticks.project(seen)[..., 1].min() - ROOM_BELOW * (right - left) / across)
     figure.set_figheight(ROOM_ABOVE + across * (top - bottom) / (right - left))
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
@@ -217,9 +210,8 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     hip = sticks.project(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
         lines = sticks.project(sticks.leg(leg)[rows])
-        order = look.order + width
         dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
-        style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
+        style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": look.order + width}
         axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
         if sticks.has_soles:
             axes.plot(*sticks.project(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
@@ -321,14 +313,10 @@ FILM_NEEDS = {
     for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
 """Variables that an animation needs. They include none of steps, because a walk can end in its first step."""
-FIGURE_2, FIGURE_6 = (
-    illustration.paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))
-    for number, stage, steps_taken in (
-        (2, RIGID_STAGE, walks.STEPS_TAKEN_RIGID),
-        (6, CONTACT_STAGE, walks.STEPS_TAKEN_CONTACT),
-    )
+FIGURES = tuple(
+    illustration.paper_figure(number, (FILM_NEEDS[stage], walks.STEPS_TAKEN[stage]), partial(draw_cycle, stage))
+    for number, stage in ((2, RIGID_STAGE), (6, CONTACT_STAGE))
 )
-FIGURES = (FIGURE_2, FIGURE_6)
 
 PUSH_SHOWN_S = 0.08
 """Time for which an animation shows a push-off (s)."""
@@ -403,8 +391,7 @@ def pictures(
     """
     lines = moving_lines(sticks, at)
     looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
-    soles: list[dict[str, Any]] = [{"color": look.colour} for look in LEGS if sticks.has_soles]
-    looks = [*looks, *soles, {"color": BLACK}][: len(lines)]
+    looks = [*looks, *({"color": look.colour} for look in LEGS if sticks.has_soles), {"color": BLACK}][: len(lines)]
     behind = [] if other is None else moving_lines(other, at)
     shown = np.concatenate([line.reshape(-1, 2) for line in (*lines, *behind)])
     with figure_style():

@@ -122,10 +122,9 @@ def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) 
     for column, parameter in enumerate(shown):
         x, few = spread(group, parameter)
         monotonic = bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
-        ordered = group["outcome"].ndim == 1 and column == 0 and monotonic
         for panel, name in zip(axes[:, column], names, strict=True):
             y = group[name].astype(float).ravel()
-            if ordered:
+            if group["outcome"].ndim == 1 and column == 0 and monotonic:
                 panel.plot(x, y, color=BLUE, linewidth=1.4, marker="o" if x.size <= 60 else "", markersize=2.6)
             else:
                 dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
@@ -144,8 +143,7 @@ def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]
     plot."""
     values = numbers(group, parameter)
     if not is_pointwise(group, parameter):
-        dims = group.variables["outcome"].dims
-        along = [-1 if name == parameter else 1 for name in dims]
+        along = [-1 if name == parameter else 1 for name in group.variables["outcome"].dims]
         values = np.broadcast_to(values.reshape(along), group["outcome"].shape)
     return values.ravel(), np.unique(np.linspace(0, values.size - 1, min(values.size, MAX_SCATTERED)).astype(int))
 
@@ -172,9 +170,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     x = numbers(group, across)
     values = group[few].tolist()
     colours = matplotlib.colormaps["viridis"](0.85 * np.linspace(0.0, 1.0, len(values)))
-    looks = [
-        {"color": colour, "linestyle": dashes} for colour, dashes in zip(colours, cycle(SWEEP_DASHES), strict=False)
-    ]
+    looks = [{"color": colour, "linestyle": dash} for colour, dash in zip(colours, cycle(SWEEP_DASHES), strict=False)]
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
         found = group[name].astype(float)

@@ -1,4 +1,6 @@
-"""Figures of the walks of both models: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
+"""Figures of the walks of both models: 5, 7 and 10 (over time), 9 (limit cycles), ground forces with the friction cone,
+causes of the energy lost in each step, and two runs overlaid.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,14 +12,16 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
+from walkerlab.physics.energy_channels import KNEE_STRIKES, LOSSES, SAMPLED
 from walkerlab.pipeline.headlines import claims
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.views.figures.canvas import add_legend, entry, figure_style, files_of, label_of, panels
-from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLUE, CONTACT_LOOK, GREY, ORANGE, PALE, RECORDED, RIGID_LOOK, Look
+from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style, files_of, label_of, panels
+from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
+from walkerlab.views.figures.style import BLACK, CONTACT_LOOK, GREY, LEGS, PALE, RECORDED, RIGID_LOOK, Look
 
 Array = NDArray[np.float64]
 
@@ -32,14 +36,14 @@ ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
 
 NO_STATES = "'states' is not among the config's outputs"
 NO_ENERGIES = "'energies' is not among the config's outputs"
-NO_STEP = "no step was completed"
 TOUCHES = "touch_time_s"
 
 RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATE_VARIABLES, NO_STATES)
 RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
-STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
-    Need(stage, STEPS, (TOUCHES, "touch_along_m"), NO_STEP) for stage in (RIGID_STAGE, CONTACT_STAGE)
-)
+STEPS_TAKEN = {
+    stage: Need(stage, STEPS, (TOUCHES, "touch_along_m"), "no step was completed")
+    for stage in (RIGID_STAGE, CONTACT_STAGE)
+}
 
 PAPER_STRIDES = 5
 """Number of strides in the figures over time, as in the paper."""
@@ -77,17 +81,14 @@ class DrawnWalk:
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self
-        end = int(np.searchsorted(self.time, strikes[-1], side="right"))
-        return replace(self, strikes=strikes, end=end)
+        return replace(self, strikes=strikes, end=int(np.searchsorted(self.time, strikes[-1], side="right")))
 
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
     """Return the walks whose trajectories have the given variables, the rigid model's walk first."""
-    every = ((RIGID_STAGE, RIGID_LOOK), (CONTACT_STAGE, CONTACT_LOOK), (RECORDED_STAGE, RECORDED))
-    available = [
-        (stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})
-    ]
-    return [walk_of(results[stage], look) for stage, look in available]
+    looks = {RIGID_STAGE: RIGID_LOOK, CONTACT_STAGE: CONTACT_LOOK, RECORDED_STAGE: RECORDED}
+    available = [stage for stage in looks if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
+    return [walk_of(results[stage], looks[stage]) for stage in available]
 
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
@@ -301,14 +302,113 @@ def draw_energies(results: Results) -> Drawn:
     return figure, (extent, means, bool(claims_in(results)), impacts, driven, walks)
 
 
+NORMAL_FORCE = "normal_force_N"
+FRICTION = "friction_force_N"
+FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL_FORCE, FRICTION), "'forces' is not among the config's outputs")
+TOTAL: Final = "total_energy_J"
+LOSS_STYLES: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
+DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
+KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
+ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
+SHOWN_STRIDES = 2
+"""Number of strides in the figure of forces. With more of them, single impacts could not be told apart."""
+SHOWN_STEPS = 40
+"""Number of steps in the figure of energy losses."""
+SHOWN_LOADS: Final = 0.99
+"""Fraction of the samples with load that fit on the axis of the force. Impacts of many times the weight do not fit."""
+NEGLIGIBLE_LOSS: Final = 1e-3
+"""Fraction of the energy lost below which a cause is not drawn."""
+
+
+def draw_forces(results: Results) -> Drawn:
+    """Plot normal force and friction over time (left) and against each other, with the friction cone (right)."""
+    result = results[CONTACT_STAGE]
+    whole = walk_of(result, CONTACT_LOOK)
+    walk = whole.first_strides(SHOWN_STRIDES)
+    every = whole[NORMAL_FORCE]
+    loads = walk[NORMAL_FORCE]
+    pulls = walk[FRICTION]
+    # The axis of the normal force ends at this value (N).
+    top = 1.1 * float(np.quantile(loads[loads > 0.0], SHOWN_LOADS)) if (loads > 0.0).any() else 1.0
+    figure = blank(4.4)
+    parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
+    normal, friction, cone = (parts[name] for name in ("normal", "friction", "cone"))
+    key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
+    steepest = 0.0
+    # Without friction there is no cone.
+    for name, style in (("static", "-"), ("dynamic", "--")) if result[TRAJECTORY][FRICTION].any() else ():
+        coefficient = float(result.identity.config_slice["contact"][f"{name}_friction"])
+        bound: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": style}
+        for sign in (-1.0, 1.0):
+            cone.plot([0.0, top], [0.0, sign * coefficient * top], **bound)
+        key.append(entry(f"{name} coefficient, {coefficient:g}", **bound))
+        steepest = max(steepest, coefficient)
+    cone.axhline(0.0, color=GREY, linewidth=0.6)
+    for look, load, pull in zip(LEGS, loads.T, pulls.T, strict=True):
+        line(normal, walk.time, load, look)
+        line(friction, walk.time, pull, look)
+        loaded = (load > 0.0) & (load < top)
+        cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
+    # Otherwise the axis would begin and end at zero if there is no friction.
+    reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
+    wide = max(reach, 0.6 * steepest * top)
+    of_normal = walk.label("normal force", NORMAL_FORCE)
+    of_friction = walk.label("friction", FRICTION)
+    end = (0.0, float(walk.time[-1]))
+    normal.set(ylabel=of_normal, title="(a) normal force", xlim=end, ylim=(-0.03 * top, top))
+    friction.set(ylabel=of_friction, title="(b) friction, downhill positive", xlim=end, ylim=(-reach, reach))
+    friction.sharex(normal)
+    friction.set_xlabel("time (s)")
+    normal.tick_params(labelbottom=False)
+    cone.set(xlabel=of_normal, ylabel=of_friction, title="(c) against the friction cone")
+    cone.set(xlim=(0.0, top), ylim=(-wide, wide))
+    add_legend(figure, key)
+    # The ratio of two forces that are almost zero means nothing.
+    borne = every > 0.1 * float(np.median(every.max(axis=1)))
+    ratio = float((np.abs(whole[FRICTION][borne]) / every[borne]).max()) if borne.any() else 0.0
+    return figure, (0 if walk is whole else SHOWN_STRIDES, ratio, every.max())
+
+
+def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
+    """Return the energy (J) lost in each step by cause (label, colour). What no other cause explains is lost in the
+    knees."""
+    # Steps are divided at the last sample before a touchdown, so that the whole impact belongs to the step that it
+    # starts.
+    rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
+    by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
+    supplied = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
+    total = np.diff((supplied - walk[TOTAL])[rows])
+    by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
+    least = NEGLIGIBLE_LOSS * np.abs(total).max()
+    return {cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= least}
+
+
+def draw_losses(results: Results) -> Drawn:
+    """Plot the losses in each step as a stacked bar. The caption gives the mean loss (J) by cause, without the first
+    step."""
+    by_cause = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
+    figure, axes = panels(2.9)
+    steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(by_cause.values())).size))
+    below = np.zeros(steps.size)
+    for (_, colour), lost in by_cause.items():
+        axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)
+        below += lost[: steps.size]
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.set(xlabel="step", ylabel="energy lost (J)")
+    add_legend(figure, [Patch(facecolor=colour, label=label) for label, colour in by_cause])
+    # The first step does not begin with an impact, so it counts only if there is no other step.
+    later = {label: float(lost[min(1, lost.size - 1) :].mean()) for (label, _), lost in by_cause.items()}
+    return figure, (later, sum(later.values()))
+
+
 OVERLAY_ROWS: Final[tuple[tuple[str, Any, str], ...]] = (
     ("angle", 0, "angle of leg 1 (rad)"),
     ("angle", 1, "angle of leg 2 (rad)"),
     ("mechanical_J", slice(None), "energy (J)"),
 )
 RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
-    {"color": BLUE, "linewidth": 1.3},
-    {"color": ORANGE, "linewidth": 1.2, "linestyle": (0.0, (3.2, 1.4))},
+    {**RIGID_LOOK.line, "linewidth": 1.3},
+    {**CONTACT_LOOK.line, "linewidth": 1.2},
 )
 
 
@@ -351,4 +451,8 @@ FIGURES = (
     paper_figure(7, (RIGID_STATES,), draw_states),
     paper_figure(9, (RIGID_STATES,), draw_cycles),
     paper_figure(10, (RIGID_ENERGIES,), draw_energies),
+)
+GROUND = (
+    Illustration("ground-forces", (FORCES,), draw_forces),
+    Illustration("energy-lost", (ENERGY, STEPS_TAKEN[CONTACT_STAGE]), draw_losses),
 )

@@ -5,7 +5,7 @@ Each answer imports the page sections that it needs, so that other commands star
 
 import math
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,17 +16,7 @@ from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
-from walkerlab.views.report.tables import (
-    Cell,
-    Column,
-    Table,
-    describe_summary,
-    measured,
-    paragraph,
-    side_by_side,
-    table,
-    table_lines,
-)
+from walkerlab.views.report.tables import Cell, Column, Table, describe_summary, lay_out, measured, side_by_side, table
 from walkerlab.views.report.words import MODEL_NAMES, WALKED_LABEL, describe_error, describe_limp, legs_differ, words
 from walkerlab.views.report.words import walks as walk_text
 
@@ -74,19 +64,6 @@ def further_tables(stage: str, summary: Summary) -> list[str]:
     from walkerlab.views.report.sections import robustness
 
     return ["", *lay_out(robustness.filled_tables(summary)[robustness.FIRST_TABLES :])]
-
-
-def lay_out(blocks: Iterable[str | Table]) -> list[str]:
-    lines: list[str] = []
-    after_table = False
-    for block in blocks:
-        is_table = isinstance(block, Table)
-        block_lines = table_lines(block) if isinstance(block, Table) else paragraph(block)
-        if block_lines:
-            lines += [""] if lines and (is_table or after_table) else []
-            lines += block_lines
-            after_table = is_table
-    return lines
 
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
@@ -246,16 +223,14 @@ def continuation(summary: Summary) -> list[str | Table]:
     """Summarise the families and list every bifurcation. `walkerlab show` lists branches and exponents."""
     from walkerlab.views.report.sections import families
 
-    branches = count(len(summary["branches"]), "branch", "branches")
-    head = f"{branches} of gaits over {families.parameter(summary)}."
+    head = f"{count(len(summary['branches']), 'branch', 'branches')} of gaits over {families.parameter(summary)}."
     return [head, *families.findings(summary), families.bifurcations(summary)]
 
 
 def starts(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections.families import attractors
 
-    sentences = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    return [*sentences, attractors(summary)]
+    return [words("basin.shares", summary), *words.parts("basin.grounds", summary), attractors(summary)]
 
 
 def robustness_answer(summary: Summary) -> list[str | Table]:

@@ -250,8 +250,7 @@ class Results:
 
     def group(self, stage: str, path: str) -> Group | None:
         """Return a group of a stage's result, or None if it does not exist."""
-        result = self.stored.get(stage)
-        return None if result is None else result.groups.get(path)
+        return self.stored[stage].groups.get(path) if stage in self.stored else None
 
 
 SectionMaker = Callable[[Results], Section | None]

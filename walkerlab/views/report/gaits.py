@@ -27,6 +27,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     names  names of the gait's coordinates
     """
     six = partial(numbers.fixed, decimals=6)
+    five = partial(numbers.fixed, decimals=5)
     multipliers = range(max(len(multipliers_of(gait)) for gait in sets.values()))
     differ = any(legs_differ(gait) for gait in sets.values())
     first = "multipliers of a stride " if differ else "multipliers "
@@ -37,14 +38,12 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         measured("step length S", "step_length_m", six),
         *(asymmetry_lines(six) if differ else ()),
         *(Column(title, partial(multiplier, place)) for place, title in enumerate(titles)),
-        Column(
-            f"spectral radius{' per step' if differ else ''}", "spectral_radius", partial(numbers.fixed, decimals=5)
-        ),
+        Column(f"spectral radius{' per step' if differ else ''}", "spectral_radius", five),
         Column("stable", "stable"),
         *work_columns(partial(numbers.number, digits=4)),
         measured("speed", "speed_m_s", partial(numbers.fixed, decimals=4)),
         measured("Froude number", "froude", partial(numbers.fixed, decimals=4)),
-        measured("cost of transport", "cost_of_transport", partial(numbers.fixed, decimals=5)),
+        measured("cost of transport", "cost_of_transport", five),
         measured("mean energy above the stance foot", "energy_J", partial(numbers.fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(numbers.number, digits=2)),
         measured("minimum normal force", "min_normal_force_N", partial(numbers.number, digits=4)),
@@ -120,12 +119,10 @@ def coordinate(name: str) -> str:
 
 def symbol(name: str) -> str:
     """Return symbol and body of a coordinate, such as 'θ̇₁, shank' for 'dtheta_1_shank'."""
-    match = COORDINATE_NAME.fullmatch(name)
-    if match is None:
+    if (match := COORDINATE_NAME.fullmatch(name)) is None:
         return name
-    dot = numbers.DOT if match["rate"] else ""
     body = f", {match['body'].replace('_', ' ')}" if match["body"] else ""
-    return f"θ{dot}{(match['index'] or '').translate(numbers.SUBSCRIPTS)}{body}"
+    return f"θ{numbers.DOT if match['rate'] else ''}{(match['index'] or '').translate(numbers.SUBSCRIPTS)}{body}"
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
@@ -171,8 +168,7 @@ def tabulate_gaits(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Seque
         Column("stable", "stable"),
         Column("remark", lambda gait: "chosen" if gait["chosen"] else gait["objection"]),
     )
-    alone = list(sets) == ["corrected"]
     numbered = {name: [{**gait, "gait": index} for index, gait in enumerate(found, 1)] for name, found in sets.items()}
-    gaits = {"" if alone else SETS[name]: found for name, found in numbered.items()}
+    gaits = {"" if list(sets) == ["corrected"] else SETS[name]: found for name, found in numbered.items()}
     differ = any(legs_differ(gait) for found in sets.values() for gait in found)
     return table(f"All {'gaits of one stride' if differ else 'one-step gaits'} found", columns, gaits)

@@ -121,9 +121,7 @@ def length(value_m: float | None, digits: int = 4) -> str:
     magnitude = abs(value_m)
     if magnitude >= 0.1 or magnitude == 0:
         return quantity(value_m, "m", digits)
-    if magnitude >= 1e-4:
-        return quantity(1e3 * value_m, "mm", digits)
-    return quantity(1e6 * value_m, "µm", digits)
+    return quantity(1e3 * value_m, "mm", digits) if magnitude >= 1e-4 else quantity(1e6 * value_m, "µm", digits)
 
 
 def format_integer(value: int | None) -> str:

@@ -27,8 +27,7 @@ from walkerlab.views.report.words import words
 
 def added_sections(slot: str) -> tuple[SectionMaker, ...]:
     """Return the functions that build the sections that extensions add at a position (`SLOTS`) of the page."""
-    makers = (maker for extension in extensions().values() for maker in extension.sections.get(slot, ()))
-    return tuple(map(load, makers))
+    return tuple(load(maker) for extension in extensions().values() for maker in extension.sections.get(slot, ()))
 
 
 SECTIONS: tuple[SectionMaker, ...] = (
@@ -64,8 +63,7 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
     main = [section for section in sections if section.page == MAIN]
     further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}
     further = {file: sections for file, sections in further.items() if sections}
-    links = closing.link_pages(results, further)
-    if links is not None:
+    if (links := closing.link_pages(results, further)) is not None:
         main.insert([section.anchor for section in main].index("glossary"), links)
     relation = "After" if results.departures else "Redoes"
     option = "" if run == files.DEFAULT else run
@@ -81,10 +79,9 @@ def lead(config: schema.Config, run: str) -> str:
     """Describe what was run: the walker, its slope and its task."""
     equations = config.equations if walkers.is_passive_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
-    degrees = math.degrees(config.slope_rad)
     alone = walkers.why_rigid_alone(config.walker)
     acting = drives.drives_of(config), drives.springs_of(config)
-    return words("lead.scene", config, change, degrees, equations, *acting, alone)
+    return words("lead.scene", config, change, math.degrees(config.slope_rad), equations, *acting, alone)
 
 
 def sections_of(results: Results, makers: tuple[SectionMaker, ...] = SECTIONS) -> tuple[Section, ...]:

@@ -8,7 +8,6 @@ from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store import artifact, content
-from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.files import storing, write_atomically
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 from walkerlab.views.report import registry, tables
@@ -18,7 +17,11 @@ from walkerlab.views.report.sections.closing import TITLES
 
 
 def run(
-    config: Config, inputs: Mapping[str, Stored], progress: Progress, folder: Path, left_out: Sequence[LeftOut] = ()
+    config: Config,
+    inputs: Mapping[str, artifact.Stored],
+    progress: Progress,
+    folder: Path,
+    left_out: Sequence[LeftOut] = (),
 ) -> content.Content:
     """Write the report's pages into the run's folder.
 
@@ -39,7 +42,7 @@ def run(
 
 
 def write_pages(
-    config: Config, inputs: Mapping[str, Stored], folder: Path, left_out: Sequence[LeftOut] = ()
+    config: Config, inputs: Mapping[str, artifact.Stored], folder: Path, left_out: Sequence[LeftOut] = ()
 ) -> tuple[tuple[Page, ...], Results]:
     """Write the pages for which there are results, and remove those that have no content any more.
 

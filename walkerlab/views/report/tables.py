@@ -78,11 +78,10 @@ def measured(
     """Return a column of numbers in a unit with a `prefix`, such as m. The unit comes from `labels` or the key's
     suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
-    factor = PREFIXES[prefix]
 
     def scaled(record: Mapping[str, Any]) -> Any:
         value = record.get(key)
-        return None if value is None else factor * value
+        return None if value is None else PREFIXES[prefix] * value
 
     return Column(add_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
 
@@ -247,6 +246,20 @@ def paragraph(text: str) -> list[str]:
     return textwrap.wrap(text, PARAGRAPH_WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
+def lay_out(blocks: Iterable[str | Table]) -> list[str]:
+    """Return the lines of paragraphs and tables, with an empty line before and after each table."""
+    lines: list[str] = []
+    after_table = False
+    for block in blocks:
+        is_table = isinstance(block, Table)
+        block_lines = table_lines(block) if isinstance(block, Table) else paragraph(block)
+        if block_lines:
+            lines += [""] if lines and (is_table or after_table) else []
+            lines += block_lines
+            after_table = is_table
+    return lines
+
+
 def format_value(value: Any) -> str:
     """Format a value on one line."""
     if value is None:
@@ -256,10 +269,8 @@ def format_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.10g}"
     if isinstance(value, list):
-        return (
-            "  ".join(f"({format_value(item)})" if isinstance(item, list) else format_value(item) for item in value)
-            or "-"
-        )
+        items = (f"({format_value(item)})" if isinstance(item, list) else format_value(item) for item in value)
+        return "  ".join(items) or "-"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {format_value(item)}" for key, item in value.items()) or "-"
     return str(value)

@@ -58,8 +58,7 @@ class Track:
     def thin(self, gap: float) -> "Track":
         """Keep the first and the most loaded sample of each interval of `gap` s, and both sides of every jump."""
         time = self["t"]
-        bins = np.floor(time / gap).astype(np.int64)
-        first = np.flatnonzero(np.diff(bins, prepend=-1))
+        first = np.flatnonzero(np.diff(np.floor(time / gap).astype(np.int64), prepend=-1))
         # A heel strike has two samples with the same time, before and after it.
         jumps = np.flatnonzero(np.diff(time) <= 0.0)
         samples = {*first.tolist(), *jumps.tolist(), *(jumps + 1).tolist(), time.size - 1}

@@ -58,9 +58,8 @@ def describe_error(error: Mapping[str, Any]) -> str:
     """Describe the numerical errors of a walk and how they were measured."""
     if "reason" in error:
         return f"unknown: {error['reason']}"
-    text = join_words(
-        f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERROR_TEXTS.items() if key in error
-    )
+    errors = (f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERROR_TEXTS.items() if key in error)
+    text = join_words(errors)
     last = [steps[-1] for name, steps in error.get("of_steps", {}).items() if name == "step_period_s"]
     if last and last[0] < MAX_LAST_ERROR_RATIO * error["step_period_s"]:
         text += f" (in the period of the last step {quantity(last[0], 's', 1)})"

@@ -46,8 +46,7 @@ def costs(summary: Row) -> Table:
         Column("failed runs", "failures", wide=True),
     )
     methods = {scene: list(method_rows(summary, scene, levels)) for scene in summary["reference"]}
-    note = words("accuracy.costs", summary)
-    return table("Shortest run time for each error, by method", columns, methods, note=note)
+    return table("Shortest run time for each error, by method", columns, methods, note=words("accuracy.costs", summary))
 
 
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:

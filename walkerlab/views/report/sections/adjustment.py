@@ -56,13 +56,9 @@ def limit(results: Results) -> Section | None:
 def starts_table(results: Results, summary: Summary) -> Table:
     """Tabulate the start before and after the adjustment. If the scene is the paper's, include the paper's Table 2."""
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
-    caption = "The start before and after the adjustment"
-    note = ""
-    head = "coordinate"
-    if results.claims:
-        caption = "Table 2 again: the start before and after the adjustment"
-        head = "row"
-        note = "The paper's percentages are relative to the ADAMS value, which it does not state."
+    caption = f"{'Table 2 again: the' if results.claims else 'The'} start before and after the adjustment"
+    head = "row" if results.claims else "coordinate"
+    note = "The paper's percentages are relative to the ADAMS value, which it does not state." if results.claims else ""
     named = typeset if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     titles = words.terms("adjustment.starts", results.claims).items()
@@ -111,8 +107,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
     losses = {key: Cell(label) for key, (_, label) in LOSS_HEADS.items() if lost_energy(key, gait) is not None}
-    rigid_column = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
-    gaits = {"contact model": gait, "rigid model": rigid_column}
+    gaits = {"contact model": gait, "rigid model": {**rigid, "slip_m": Cell("none"), "lost_J": losses}}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)
 
 

@@ -105,8 +105,6 @@ def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]
         same_reason = [absent for absent in missing if absent.why == reason]
         first = join_words(absent.what for absent in same_reason)
         yield first, reason, "; ".join(dict.fromkeys(absent.saves for absent in same_reason if absent.saves))
-        dependents = join_words(
-            absent.what for absent in missing if absent.why != reason and causes[absent.why] == reason
-        )
-        if dependents:
-            yield dependents, f"needs {first}", ""
+        others = join_words(absent.what for absent in missing if absent.why != reason and causes[absent.why] == reason)
+        if others:
+            yield others, f"needs {first}", ""

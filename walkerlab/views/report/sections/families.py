@@ -111,8 +111,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     for branch, place, motion in moving:
         x, y = float(branch["value"][place]), float(branch["step_period"][place][0])
         stable = bool(branch["stable"][place])
-        track = track_in(motion)
-        if track is not None:
+        if (track := track_in(motion)) is not None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
             walker = Walker(name, DIAGRAM_MODEL, track.thin(gap), tuple(strikes.tolist()), (), pushes=pushes)

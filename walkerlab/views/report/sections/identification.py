@@ -16,7 +16,6 @@ NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a combination of parameters counts as without effect on walks."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 NOTABLE_CHANGE = 0.5  # smallest reported change of an estimate (standard errors) for a 1 % larger fixed parameter
-UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
@@ -36,11 +35,11 @@ ESTIMATE_COLUMNS = (
     Column("at a bound", "at_bound"),
 )
 QUALITY_COLUMNS = (
-    Column("quantity", "quantity"),
-    Column("residual (r.m.s.)", "residual", lambda value: number(value, 3), numeric=True),
-    Column("measurement noise", "noise", lambda value: number(value, 3), numeric=True),
-    Column("unit", "unit"),
-    Column("information lost without it", "share", lambda value: f"{100.0 * value:.0f} %", numeric=True),
+    Column("quantity"),
+    Column("residual (r.m.s.)", written=lambda value: number(value, 3), numeric=True),
+    Column("measurement noise", written=lambda value: number(value, 3), numeric=True),
+    Column("unit"),
+    Column("information lost without it", written=lambda value: f"{100.0 * value:.0f} %", numeric=True),
 )
 FIXED_COLUMNS = (
     Column("held fixed", "to"),
@@ -102,14 +101,9 @@ def is_usable(verdict: Mapping[str, Any]) -> bool:
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
+    noise = summary["noise"]["measurement"]
     quality = [
-        {
-            "quantity": axis_label(name),
-            "residual": residual,
-            "noise": summary["noise"]["measurement"].get(name),
-            "unit": unit_by_name(name),
-            "share": summary["contributions"].get(name, 0.0),
-        }
+        (axis_label(name), residual, noise.get(name), unit_by_name(name), summary["contributions"].get(name, 0.0))
         for name, residual in summary["rms_residual"].items()
     ]
     estimates = [row for row in summary["estimates"] if row["standard_error"] is not None]
@@ -133,8 +127,7 @@ def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, 
         row = rows.setdefault(entry["to"], {"to": entry["to"], "change": entry["change"], "size": 0.0})
         row[entry["estimate"]] = fixed(entry["per_percent"], decimals_of(errors[entry["estimate"]]))
         row["size"] = max(row["size"], abs(entry["per_percent"]) / errors[entry["estimate"]])
-    largest = sorted(rows.values(), key=lambda row: -row["size"])
-    return [row for row in largest if row["size"] > NOTABLE_CHANGE]
+    return [row for row in sorted(rows.values(), key=lambda row: -row["size"]) if row["size"] > NOTABLE_CHANGE]
 
 
 def rounded(value: float, error: float | None) -> str:
@@ -148,9 +141,14 @@ def decimals_of(error: float) -> int:
     return max(0, -int(exponent) + (mantissa < "2"))
 
 
+def unit_ending(unit: str) -> str:
+    """Return a unit as it follows a number in a sentence, with a space."""
+    return {"deg": " degrees", "1": "", "": ""}.get(unit, f" {unit}")
+
+
 def value_and_error(value: float, error: float | None, unit: str) -> str:
     """Format a value with its standard error, as in 9.8 ± 0.2 kg."""
-    ending = UNITS_IN_WORDS.get(unit, f" {unit}")
+    ending = unit_ending(unit)
     if not error:
         return f"{number(value, 6)}{ending}"
     if error >= 10.0 or not math.isfinite(error):
@@ -200,10 +198,7 @@ def describe_estimate(row: Mapping[str, Any], leg: str = BOTH_LEGS) -> str:
 def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
     """Describe how estimates change if the fixed parameter with the most influence is off."""
     change = quantity(held["change"], unit_by_name(held["to"]), 2)
-    units = [UNITS_IN_WORDS.get(row["unit"], f" {row['unit']}") for row in estimates]
-    changes = [
-        f"the {axis_label(row['key'])} by {held[row['key']]}{unit}" for row, unit in zip(estimates, units, strict=True)
-    ]
+    changes = [f"the {axis_label(row['key'])} by {held[row['key']]}{unit_ending(row['unit'])}" for row in estimates]
     return f"If {held['to']}, which is held fixed, were {change} larger, this would change {join_words(changes)}."
 
 
@@ -244,9 +239,8 @@ def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
 def describe_radius(radius: Mapping[str, float]) -> str:
     value = value_and_error(radius["value"], radius["standard_error"], "1")
     plain = fixed(radius["plain"], decimals_of(radius["standard_error"]))
-    return (
-        f"The steps alone, without a model, have a largest multiplier of {value} ({plain} before correction for noise)."
-    )
+    multiplier = f"a largest multiplier of {value} ({plain} before correction for noise)"
+    return f"The steps alone, without a model, have {multiplier}."
 
 
 def describe_noise(summary: Mapping[str, Any]) -> str:
@@ -284,8 +278,8 @@ def plan_findings(summary: Mapping[str, Any]) -> list[str]:
 def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
     """Return a sentence about a target error, with the fewest steps that reach it."""
     entry = rows[0]["errors"][place]
-    unit = UNITS_IN_WORDS.get(entry["unit"], f" {entry['unit']}")
-    purpose = f"To determine the {axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
+    wanted = f"{number(entry['wanted'])}{unit_ending(entry['unit'])}"
+    purpose = f"To determine the {axis_label(entry['key'])} to ± {wanted}"
     reached = [row for row in rows if row["errors"][place]["steps_needed"]]
     if not reached:
         return f"{purpose}, {format_integer(most)} steps do not suffice."
@@ -296,9 +290,8 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
 
 
 def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
-    entries = summary["measurements"][0]["errors"]
     columns = [Column("measurement", "measurement"), Column("start", "start")]
-    for index, entry in enumerate(entries):
+    for index, entry in enumerate(summary["measurements"][0]["errors"]):
         title = f"± {axis_label(entry['key'])} ({entry['unit']})"
         columns.append(Column(title, partial(error_text, index), numeric=True))
         if "wanted" in entry:

@@ -31,12 +31,11 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
     # The animation ends when the slower model has taken `most` steps.
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
-    by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
-    tracks = {stage: track.cut(end) for stage, track in by_stage.items() if track is not None}
+    tracks = {stage: track.cut(end) for stage in MODEL_NAMES if (track := track_in(results.group(stage, "trajectory")))}
     if not tracks:
         return None
     config = results.config
-    torso = results.config.walker.torso
+    torso = config.walker.torso
     length = config.walker.leg_length_m
     steps = {MODEL_NAMES[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
@@ -102,12 +101,8 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
     times: Any = np.array([0.0, *strikes])
     instants = np.unique(np.concatenate((times, 0.5 * (times[:-1] + times[1:]), [track.end])))
     rows = np.clip(np.searchsorted(track["t"], instants), 0, track["t"].size - 1)
-    joints = [("f", "0"), ("k", "0"), ("h", ""), ("k", "1"), ("f", "1")]
-    lines = [
-        (track[f"{joint}x{leg}"], track[f"{joint}y{leg}"])
-        for joint, leg in joints
-        if f"{joint}x{leg}" in track.channels
-    ]
+    joints = [("fx0", "fy0"), ("kx0", "ky0"), ("hx", "hy"), ("kx1", "ky1"), ("fx1", "fy1")]
+    lines = [(track[along], track[height]) for along, height in joints if along in track.channels]
     return tuple(tuple((round(1000 * float(x[row])), -round(1000 * float(y[row]))) for x, y in lines) for row in rows)
 
 

@@ -49,7 +49,7 @@ DERIVATIVE_COLUMNS = (
 )
 
 
-OPTIMUM_COLUMNS = (Column("parameter", "to"), Column("best", "best", lambda value: number(value, 7), numeric=True))
+OPTIMUM_COLUMNS = (Column("parameter"), Column("best", written=lambda value: number(value, 7), numeric=True))
 CONSTRAINT_COLUMNS = (
     Column("quantity", "quantity"),
     Column("minimum", "from", number, numeric=True),
@@ -66,14 +66,12 @@ COMPARISON_COLUMNS = (
 
 
 def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
-    rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
-    constraints = table("Constraints", CONSTRAINT_COLUMNS, summary["constraints"])
     compared = summary.get("robustness", ())
     worse = [row["quantity"] for row in compared if "start" in row and "best" in row and is_worse(row)]
     return [
         *words.parts("design.findings", summary, worse),
-        table("Optimum", OPTIMUM_COLUMNS, rows),
-        constraints,
+        table("Optimum", OPTIMUM_COLUMNS, list(summary["best"].items())),
+        table("Constraints", CONSTRAINT_COLUMNS, summary["constraints"]),
         table("Robustness", COMPARISON_COLUMNS, compared),
     ]
 
@@ -120,14 +118,12 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
     first = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES]
     top = built[:MAX_DERIVATIVES]
-    unlisted = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
+    omitted = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
         table("Gait sensitivity norms", columns, norms, note=words("robustness.norms", legs_differ)),
         table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
         table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
-        table(
-            "Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", unlisted)
-        ),
+        table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", omitted)),
         table("Gravity, slope and ground", DERIVATIVE_COLUMNS, environment[:MAX_DERIVATIVES]),
         table("Parameters that are zero", DERIVATIVE_COLUMNS, zeros, note=words("robustness.zeros")),
     ]

@@ -61,9 +61,8 @@ def departure(results: Results) -> str:
 
 def section(results: Results) -> Section | None:
     walks = {model.lower(): summary for stage, model in MODEL_NAMES.items() if (summary := results.summary(stage))}
-    verdicts = Counter(row["verdict"] for row in results.claims)
     misprint = any(erratum["where"].startswith("A.5") for erratum in results.summary("compare").get("errata", ()))
-    arguments = (results.summary("fixedpoint"), verdicts, misprint)
+    arguments = (results.summary("fixedpoint"), Counter(row["verdict"] for row in results.claims), misprint)
     config = results.config
     opening = ""
     if walks:
@@ -88,10 +87,8 @@ def failures(results: Results) -> list[str]:
         for absent in failed
     ]
     errors = {name: result.summary.get("no_answer") for name, result in results.stored.items()}
-    return [
-        *sentences,
-        *(f"{name}: {reason['message'].rstrip('.')}." for name, reason in errors.items() if reason is not None),
-    ]
+    sentences += [f"{name}: {reason['message'].rstrip('.')}." for name, reason in errors.items() if reason is not None]
+    return sentences
 
 
 def outcome_statements(results: Results) -> Iterator[Statement]:

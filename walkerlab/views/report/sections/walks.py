@@ -124,10 +124,9 @@ def steps(results: Results) -> Section | None:
     hidden = len(numbered) - HEAD_STEPS - TAIL_STEPS
     rows = numbered if hidden <= 0 else [*numbered[:HEAD_STEPS], *numbered[-TAIL_STEPS:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[name], numeric=True) for name in series)]
-    note = words("walks.steps", HEAD_STEPS, hidden)
     models = {stage: model.lower() for stage, model in MODEL_NAMES.items()}
     errors = {models[stage]: error for stage in models if (error := results.summary(stage).get("numerical_error"))}
-    listed = table("Periods and lengths of the steps", columns, rows, note=note)
+    listed = table("Periods and lengths of the steps", columns, rows, note=words("walks.steps", HEAD_STEPS, hidden))
     blocks = (listed, Paragraph(words("error.of_models", errors) if errors else ""))
     periods = {models[stage]: values for (stage, key), values in series.items() if key == "step_periods_s"}
     return Section.create("steps", "Step by step", blocks, words("walks.periods", periods))
