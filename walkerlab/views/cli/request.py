@@ -211,7 +211,10 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def fail(error: WalkerlabError) -> typer.Exit:
-        """Print a failure and, with `--json`, an object that describes it, and return the exit that it causes."""
+        """Print a failure and, with `--json`, an object that describes it.
+
+        Returns the exception that ends the command with the failure's exit code.
+        """
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
@@ -221,7 +224,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
 
     try:
         yield
-        # Otherwise an error of the output would appear at exit, with a traceback.
+        # Without this line, an error in writing the output would appear only at exit, with a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
         raise fail(error) from None
@@ -384,7 +387,10 @@ class Offer(NamedTuple):
 
 
 def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
-    """Add a command to the program of a graph. Errors of its function end it as `exit_on_failure` describes."""
+    """Add a command to the program of a graph.
+
+    If the command's function raises an error, the command ends as `exit_on_failure` describes.
+    """
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # A flag such as --from cannot be the name of a parameter.

@@ -93,7 +93,7 @@ def state_of(step: Step) -> str:
 
 
 def explain_state(step: Step) -> str:
-    """Say why a result has its state, or return '' if that needs no explanation."""
+    """Explain the state of a result, or return '' if that needs no explanation."""
     return "" if step.reason in (artifact.NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 

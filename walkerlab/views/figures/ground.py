@@ -27,7 +27,7 @@ SHOWN_STRIDES = 2
 SHOWN_STEPS = 40
 """Number of steps in the figure of energy losses."""
 SHOWN_LOADS: Final = 0.99
-"""Fraction of the samples with load that fit on the axis of the force. Impacts of many times the weight do not fit."""
+"""The force axis covers this fraction of the loaded samples. It leaves out impacts of many times the weight."""
 NEGLIGIBLE_LOSS: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 
