@@ -166,7 +166,7 @@ class FamilySearch:
         attractors = sweep_attractor(self.step_map, start, values, how.transient, how.samples, self.listener.advance)
         if not attractors.found:
             return replace(family, attractors=attractors)
-        # Attractors are listed by rising value.
+        # Attractors are listed in order of increasing parameter value.
         if end < begin:
             attractors = replace(attractors, found=attractors.found[::-1])
         chosen = attractors.found[:: max(1, len(attractors.found) // how.exponents)]
