@@ -46,6 +46,7 @@ from walkerlab.config.walkers import CompassWalker, Kneed, KneeJoint, PartsWalke
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_walk import SHORTEST_LANDING
+from walkerlab.physics.mechanics.hinges import HIP_ROW, TORQUE
 from walkerlab.physics.mechanics.parts import Assembly
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import RigidModel
@@ -329,7 +330,7 @@ def cost_faults(walker: RigidModel, search: GaitSearch) -> list[str]:
     work of the torque.
     """
     faults = []
-    for gait in search.gaits if walker.hip[2] != 0.0 else ():
+    for gait in search.gaits if walker.laws[HIP_ROW, TORQUE] != 0.0 else ():
         step = take_walk(walker, Tolerances("dop853", RTOL, ATOL, BUDGET), gait.state, 1)
         _, positive = torque_work_of_a_step(walker, gait.state, step)
         cost = math.sin(walker.slope) + positive / (walker.mass * walker.gravity * step.lengths_m[0])

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from walkerlab.physics.mechanics import impact
+from walkerlab.physics.mechanics.hinges import HIP_ROW, TORQUE
 from walkerlab.physics.mechanics.parts import Anchor, levers, masses
 from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.mechanics.rigid_model import (
@@ -56,7 +57,7 @@ def torque_work_of_a_step(model, start, step):
 
     step  a walk of one step from `start`, which has the times of its strikes
     """
-    n, torque = len(model.arm_x), model.hip[2]
+    n, torque = len(model.arm_x), model.laws[HIP_ROW, TORQUE]
     knee_strikes = () if step.knee_strike_time_s is None else step.knee_strike_time_s[:1].tolist()
     y, t, work = np.array(start), 0.0, np.zeros(2)
     for phase, end in ((BENT, knee_strikes), (STRAIGHT, step.touch_time_s[:1].tolist())):

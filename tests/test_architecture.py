@@ -210,7 +210,7 @@ def quoted_modules(path):
     return {match[0] for text in texts if isinstance(text, str) and (match := QUOTED_MODULE.match(text))}
 
 
-def test_no_module_names_a_higher_layer_in_quotes():
+def test_no_string_in_a_module_refers_to_a_module_of_a_higher_layer():
     quoted = [(path, name, layer_of_module(name)) for path in IN_LAYERS for name in quoted_modules(path)]
     upward = [(named(path), name) for path, name, layer in quoted if layer and rank(layer) < rank(layer_of(path))]
     assert upward == []

@@ -466,7 +466,7 @@ FAULTS = {
     "its sections must be at task, walks, evidence, benchmarks": (
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, sections={'top': ()})"
     ),
-    "answers and tables must be those of its own stages": (
+    "it has answers or tables for stages that are not its own": (
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, answers={'simulate': 'json:dumps'})"
     ),
 }

@@ -32,7 +32,8 @@ def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
 
 
 def drop_key(options: str, key: str) -> str:
-    """Return options, each preceded by a space, without the settings of a key. The slope has two keys."""
+    """Return options, each preceded by a space, without the settings of a key. The two keys of the slope
+    count as one."""
     words = shlex.split(options)
     same = SLOPES if key in SLOPES else (key,)
     settings = [index for index, word in enumerate(words[:-1]) if word == "--set"]
@@ -97,7 +98,7 @@ class StaleError(WalkerlabError):
 
 
 class LockedError(WalkerlabError):
-    """Another process works in the run folder, and `--no-wait` was given."""
+    """Another process is working in the run folder, and `--no-wait` was given."""
 
     exit_code = 6
 

@@ -40,7 +40,8 @@ for the key `walker.type`.
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
 """Names of the positions in the page at which extensions add sections: after the task, the walks, the models, and
 the accuracy."""
-SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again and keep its time of change
+# A folder that changed less than this long ago may change again without getting a new modification time.
+SETTLED_NS: Final = 2_000_000_000
 MAX_FOLDERS: Final = 500
 
 
@@ -106,7 +107,7 @@ class Found:
 
     @property
     def adds(self) -> dict[str, list[str]]:
-        """Added stages and words of config keys, by name, and the code for figures and page."""
+        """Names of the added stages, words added for each config key, and code on which figures and page depend."""
         extension = self.extension or Extension(INTERFACE)
         words = {key: [*extension.words(key)] for key in WORDS}
         return {"stages": [stage.name for stage in extension.stages], **words, "views": [*extension.drawing_code()]}
@@ -159,7 +160,7 @@ def check(extension: Any) -> None:
     if extension.interface != INTERFACE:
         raise ValueError(f"it was written for interface {extension.interface}, and this version has {INTERFACE}")
     if not {stage.name for stage in extension.stages}.issuperset((*extension.answers, *extension.tables)):
-        raise ValueError("its answers and tables must be those of its own stages")
+        raise ValueError("it has answers or tables for stages that are not its own")
     if not set(SLOTS).issuperset(extension.sections):
         raise ValueError(f"its sections must be at {', '.join(SLOTS)}")
     for code in extension.code():
@@ -174,7 +175,7 @@ def extensions() -> dict[str, Extension]:
 
 
 def code_by_word(kind: str) -> dict[str, str]:
-    """Return the code that all extensions add, by name, in a field `kind` of `Extension` or for a config key `kind`."""
+    """Return the code that extensions add under `kind`, by name. `kind` is a config key or a field of `Extension`."""
     return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
 
 
@@ -210,9 +211,8 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
         names += [(key, word) for key in WORDS for word in extension.words(key)]
         for name in names:
             if name in owners:
-                both = f"{owners[name]} and {found.origin}"
                 advice = "Uninstall one of the two, or ask its author for another name."
-                raise ConfigError(f"{both} both add the {' '.join(name)}.", advice)
+                raise ConfigError(f"{owners[name]} and {found.origin} both add the {' '.join(name)}.", advice)
             owners[name] = found.origin
         if found.reason:
             warn(f"extension {found.name} ({found.origin}) is left out: {found.reason}")
@@ -290,7 +290,7 @@ def read_scans(file: Path) -> dict[str, Any]:
 
 
 def write_scans(file: Path, scans: Mapping[str, Any]) -> None:
-    """Store the latest scans, but not of folders that have just changed. If this fails, the next process scans
+    """Store the latest scans, except those of folders that have just changed. If this fails, the next process scans
     again."""
     now = time.time_ns()
     settled = {folder: entry for folder, entry in scans.items() if now - entry[0] > SETTLED_NS}

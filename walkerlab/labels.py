@@ -21,7 +21,7 @@ ERROR_OF_EACH_STEP: Final = {
     "rolling_m": "rolling_m",
     "knee_strike_times_s": "knee_strike_time_s",
 }
-"""Names in `numerical_error` of the quantities that the summary of a walk has for each step."""
+"""Names that `numerical_error` uses for the per-step quantities in the summary of a walk."""
 
 
 @dataclass(frozen=True)

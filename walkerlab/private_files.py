@@ -1,4 +1,4 @@
-"""Keep files that Python executes, compiled code and pickles, where only this user can write."""
+"""Keep files that Python executes (compiled code and pickles) where only this user can write."""
 
 import contextlib
 import os
@@ -32,8 +32,8 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder and everything in it, to other users. Delete what they may have written, and return its
-    paths.
+    """Close a file, or a folder and everything in it, to other users. Delete files that others may have written, and
+    return the paths of the deleted files.
 
     Raises OSError if such a file cannot be deleted.
     """

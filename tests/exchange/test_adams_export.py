@@ -164,7 +164,7 @@ def test_pads_of_legs_that_differ_lie_under_their_footholds():
 
 
 @pytest.mark.parametrize("walker", [LIMPING[3], ONE_KNEE], ids=["two knees", "one knee"])
-def test_commands_switch_the_knees_of_different_legs(walker):
+def test_adams_commands_lock_the_knees_of_unequal_legs_at_the_right_times(walker):
     """The knees have dampers as well."""
     touches, locks, walk = run_kneed(*walker)
     assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)

@@ -42,7 +42,7 @@ def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
     assert max(error for each in counts for error in each.errors) < 5.0
 
 
-def test_error_bar_of_a_strike_just_before_the_start_contains_its_distance(tmp_path):
+def test_error_bar_of_a_strike_found_at_the_first_sample_reaches_back_to_the_true_one(tmp_path):
     """The strike is 9 ms before the first sample. If it is found at that sample, its error bar must reach back that
     far.
     """

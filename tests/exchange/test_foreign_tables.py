@@ -220,7 +220,7 @@ def test_times_in_micro_and_nanoseconds_are_read(header, scale, tmp_path):
 
 def test_unit_that_contradicts_the_file_is_an_error(tmp_path):
     for units in ({"angle": "deg"}, {"angle 1": "deg"}):
-        with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units that it is in deg"):
+        with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units says deg"):
             read(tmp_path, "walk.csv", table(), units=units)
     assert holds_the_walk(read(tmp_path, "walk.csv", table(), units={"angle": "Radians", "time": "s"}))
     with pytest.raises(ConfigError, match="is in mm, but"):
@@ -294,7 +294,7 @@ def test_markers_with_placeholder_names_may_repeat(tmp_path):
 
 @pytest.mark.parametrize("count", [2, 4])
 def test_wrong_marker_count_in_the_header_is_rejected(count, tmp_path):
-    with pytest.raises(ConfigError, match=f"coordinates of 3, and its NumMarkers is {count}"):
+    with pytest.raises(ConfigError, match=f"coordinates for 3, and its NumMarkers is {count}"):
         read(tmp_path, "walk.trc", trc(count=count), LINES)
 
 
@@ -406,7 +406,7 @@ def test_file_without_a_table_gets_an_explanation(text, message, tmp_path):
         read(tmp_path, "walk.txt", text)
 
 
-def test_table_of_two_tracks_advises_another_export(tmp_path):
+def test_table_with_two_tracks_is_rejected_with_advice_to_export_each_separately(tmp_path):
     text = "mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n0.0\t1.0\t2.0\t0.0\t1.5\t2.5\n0.1\t1.1\t2.1\t0.1\t1.6\t2.6\n"
     with pytest.raises(ConfigError, match="Tracker with several tracks") as caught:
         read(tmp_path, "walk.txt", text)

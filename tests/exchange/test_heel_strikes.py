@@ -70,7 +70,7 @@ def test_heel_strike_near_the_end_is_correct_or_omitted(after_ms, fps, tmp_path)
     assert summary["steps"] >= (3 if after_ms >= 0 else 2)
 
 
-def test_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
+def test_recording_that_begins_just_before_a_heel_strike_includes_that_strike(tmp_path):
     summary = read(tmp_path, *sampled(begin=PERIOD_S - 5e-3))
     assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=1e-5)
     assert all_steps_are_right(summary)

@@ -385,7 +385,7 @@ def test_slope_of_a_sports2d_film_is_estimated_only_if_the_floor_is_stated(tmp_p
     path = tmp_path / "walk.mot"
     path.write_text(sports2d_angles(angles_at(sampled()[0]) + SLOPE), encoding="utf-8")
     columns = {"angle 1": "right thigh+90deg", "angle 2": "left thigh+90deg"}
-    with pytest.raises(ConfigError, match="which levels the floor") as refused:
+    with pytest.raises(ConfigError, match="which rotates its data until the floor is level") as refused:
         walkerlab.identify(path, fit=["slope_deg"], level="angles", columns=columns)
     assert "--camera-tilt floor" in refused.value.advice
 

@@ -82,7 +82,7 @@ def test_campaign_parts_of_another_key_are_ignored(toy, monkeypatch):
         toy.execute("census")
 
 
-def test_option_force_restarts_the_campaign(toy, monkeypatch):
+def test_force_option_restarts_the_campaign(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     cut_off(toy, monkeypatch, after=2, force=True)
     assert (toy.runs / "paper" / "census.parts").read_bytes().count(b"\n") == 1 + 2

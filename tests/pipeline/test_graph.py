@@ -146,7 +146,7 @@ def test_graph_without_an_import_path_cannot_be_pickled():
         pickle.dumps(Graph(Stage("a", "m", "", object)))
 
 
-def test_results_of_ignores_the_config():
+def test_inputs_given_by_results_of_are_the_same_for_every_config():
     assert results_of("a", "b")(load().config) == ("a", "b")
 
 
@@ -199,7 +199,7 @@ COMPASS = ["equations=as-printed", "slope_deg=1"]
         ("contact-sim", "paper", ["contact.terrain=plane"], set()),
     ],
 )
-def test_law_of_the_study_affects_only_the_printed_equations(made_of, stage, config, sets, used):
+def test_code_of_the_printed_equations_affects_only_stages_that_use_them(made_of, stage, config, sets, used):
     assert "walkerlab.evidence.paper.law" not in made_of[stage]
     loaded = load(Path(config), sets).config
     own = Keys().identity(PIPELINE[stage], loaded, {}).config_slice

@@ -165,7 +165,7 @@ def test_walker_without_a_contact_model_is_not_advised_to_add_contact(toy):
     assert "Add" not in refused.value.advice
 
 
-def test_missing_answer_is_stored_and_reported_again(toy):
+def test_stage_without_an_answer_stores_the_reason_and_reports_it_again_when_reused(toy):
     first = toy.execute("drop", STEEP)
     again = toy.execute("drop", STEEP)
     for report in (first, again):
@@ -186,7 +186,7 @@ def test_stages_after_one_without_an_answer_still_run(toy):
     assert report.no_answer.message == "drop: the slope is too steep"
 
 
-def test_slope_without_an_answer_is_simulated_from_a_given_start(toy):
+def test_walk_on_a_slope_without_a_gait_is_simulated_from_a_given_start(toy):
     report = toy.execute("roll", STEEP, EXPLICIT)
     assert actions(report) == {"roll": "run"}
     assert report.no_answer is None

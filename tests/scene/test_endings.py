@@ -28,7 +28,7 @@ def test_walks_ended_by_pads_are_distinguished_from_falls():
     assert (second["said"], second["ground"]) == ("32 of 360 walks fell.", False)
 
 
-def test_completed_walks_and_missing_gaits_are_not_endings():
+def test_completed_walks_and_missing_gaits_are_not_listed_as_early_ends():
     assert describe_endings({"answered": 3, "no-answer": 1}, PAPER, contact=False) == []
     assert describe_endings({"walked": 3}, PAPER, contact=True) == []
 

@@ -182,7 +182,7 @@ def test_stated_size_of_an_output_is_correct(walks, stage, numbers, output):
     assert sum(columns) - 1 == numbers[output]  # The time itself is not counted.
 
 
-def test_stated_savings_of_a_scene_are_correct():
+def test_stated_savings_of_omitted_computations_are_correct():
     said = omissions.contact_walk_omissions(
         load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config
     )

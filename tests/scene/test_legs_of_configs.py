@@ -234,7 +234,7 @@ def test_each_leg_pushes_off_with_its_own_impulse_on_compliant_ground(first, sec
     assert two.energy_balance_residual_J < 1e-6
 
 
-def test_stages_that_need_equal_legs_are_few():
+def test_only_tune_needs_equal_legs():
     config = config_of("paper", HEAVY, "recording={file: walk.csv}")
     refused = [stage.name for stage in PIPELINE.stages if stage.why_unsuited(config) == "the legs differ"]
     assert refused == ["tune"]

@@ -21,27 +21,26 @@ QUESTION = Identify(fit=dict.fromkeys(KEYS))
 PLAN = Plan(steps=6, max_steps=8, errors={"slope_deg": 0.01})
 
 
-@pytest.fixture(scope="module")
-def config():
-    return load(Path("slope-3deg")).config
+def subject_of(name, model):
+    config = load(Path(name)).config
+    return find_model_gait(model, config, run_in_memory("fixedpoint", config).summary, print)
 
 
 @pytest.fixture(scope="module")
-def gait(config):
-    return run_in_memory("fixedpoint", config).summary
+def subject():
+    return subject_of("slope-3deg", "rigid")
 
 
 @pytest.fixture(scope="module")
-def options(config, gait):
-    return plan_measurements(config, gait, QUESTION, PLAN)
+def options(subject):
+    return plan_measurements(subject, QUESTION, PLAN)
 
 
 def errors(options, measurement, start="at the gait"):
     return next(o for o in options if (o.measurement, o.start) == (measurement, start))
 
 
-def test_expected_errors_equal_a_dense_gaussian_computation(config, gait, options):
-    subject = find_model_gait("rigid", config, gait, print)
+def test_expected_errors_equal_a_dense_gaussian_computation(subject, options):
     walk = walk_of(subject, predict_measured(subject, QUESTION, PLAN)[0], QUESTION)
     noise = {STEP_PERIOD: PLAN.period_noise_s, STEP_LENGTH: PLAN.length_noise_m, LEG_ANGLE: PLAN.angle_noise_rad}
     deviations = np.array([noise[walk.forecast.quantities[q]] for q in walk.data.quantity])
@@ -70,24 +69,24 @@ def test_periods_of_a_steady_gait_do_not_determine_the_slope(options):
     assert periods.steps_needed == {"slope_deg": None}
 
 
-def test_plan_needs_the_fewest_steps_for_the_requested_error(config, gait, options):
+def test_plan_needs_the_fewest_steps_for_the_requested_error(subject, options):
     needed = errors(options, ANGLES).steps_needed["slope_deg"]
     plan = PLAN.model_copy(update={"steps": needed})
-    enough = plan_measurements(config, gait, QUESTION, plan)
+    enough = plan_measurements(subject, QUESTION, plan)
     assert errors(enough, ANGLES).errors["slope_deg"] <= 0.01
-    fewer = plan_measurements(config, gait, QUESTION, plan.model_copy(update={"steps": needed - 1}))
+    fewer = plan_measurements(subject, QUESTION, plan.model_copy(update={"steps": needed - 1}))
     assert errors(fewer, ANGLES).errors["slope_deg"] > 0.01
 
 
-def test_prior_determines_what_periods_cannot(config, gait):
+def test_prior_determines_what_periods_cannot(subject):
     weighed = Identify(fit=dict.fromkeys(KEYS), prior={"slope_deg": [3.0, 0.01]})
-    error = errors(plan_measurements(config, gait, weighed, PLAN), "periods").errors["slope_deg"]
+    error = errors(plan_measurements(subject, weighed, PLAN), "periods").errors["slope_deg"]
     assert error == pytest.approx(0.01, rel=0.05)
 
 
-def test_start_too_far_from_the_gait_has_no_plan(config, gait):
+def test_start_too_far_from_the_gait_has_no_plan(subject):
     with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
-        plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))
+        plan_measurements(subject, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))
 
 
 @pytest.mark.parametrize("model", ["rigid", "contact"])
@@ -95,9 +94,7 @@ def test_planned_error_of_the_mass_of_leg_2_is_a_fraction_of_a_kilogram(model):
     """The compass has equal legs. The predicted error agrees with that from a measured limp, 0.008 kg after 20
     steps.
     """
-    config = load(Path("paper")).config
-    gait = run_in_memory("fixedpoint", config).summary
     question = Identify(fit={"walker.leg_2.leg_mass_kg": None}, model=model)
-    options = plan_measurements(config, gait, question, Plan(steps=4, max_steps=4))
+    options = plan_measurements(subject_of("paper", model), question, Plan(steps=4, max_steps=4))
     (error,) = errors(options, "periods and lengths").errors.values()
     assert 0.005 < error < 0.1

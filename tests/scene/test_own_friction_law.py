@@ -105,7 +105,7 @@ def test_law_with_several_formulas_must_define_their_switching_points(own, monke
         contact_scene(load().config, 0.3714)
 
 
-def test_compiled_walk_rejects_a_friction_law_without_a_formula_by_name(own):
+def test_compiled_walk_names_the_friction_law_that_has_no_formula(own):
     wordless = replace(own, walker=own.walker._replace(friction=Wordless(0.5)))
     with pytest.raises(TypeError, match=r"^friction_coefficient has no case for Wordless: "):
         wordless.walk(start_state(own, START), 1, Tolerances("radau5", 1e-7, 1e-9, 1000))

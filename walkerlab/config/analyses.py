@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, check_against, check_entries, check_value, key, meaning_error, why_not_rising
 from walkerlab.outcome import Outcome
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
@@ -16,6 +16,12 @@ _COORDINATE_UNITS: Final = "rad, rad/s"
 _WIDTH: Final = "the gait by 0.15 rad and 0.25 sqrt(g/L)"
 _Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
 _Bounds = tuple[_Bound, ...]  # empty for the default window
+
+
+def why_no_plane(coordinates: tuple[Coordinate, ...]) -> str:
+    """Explain why coordinates do not span a grid, or return '' if they do."""
+    fits = len(coordinates) in (2, 3) and len({*coordinates}) == len(coordinates)
+    return "" if fits else "must be two or three coordinates, each once"
 
 
 class Basin(Block):
@@ -52,12 +58,7 @@ class Basin(Block):
     steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
 
-    @field_validator("plane")
-    @classmethod
-    def _two_or_three_coordinates(cls, value: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
-        if len(value) not in (2, 3) or len(set(value)) != len(value):
-            raise meaning_error("must be two or three coordinates, each once")
-        return value
+    _plane = check_value("plane", why=why_no_plane)
 
     @field_validator("cells", "lower", "upper")
     @classmethod
@@ -80,28 +81,18 @@ _UNIT: Final = "unit of the key"
 if TYPE_CHECKING:
 
     class _Span(Block):
-        """Range of values, with the keys `from` and `to`."""
+        """Declaration of the key `from`."""
 
 else:
     # `from` is a keyword of Python, so a class body cannot declare a key of this name.
-    _Span = create_model(
-        "_Span",
-        __base__=Block,
-        __validators__={
-            "above": check_against(
-                "to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}"
-            )
-        },
-        **{
-            "from": (float, key(1.0e-4, _UNIT, "start of the range", bounds="a number below `to`")),
-            "to": (float, key(0.1, _UNIT, "end of the range", bounds="a number above `from`")),
-        },
-    )
+    _FROM = key(1.0e-4, _UNIT, "start of the range", bounds="a number below `to`")
+    _Span = create_model("_Span", __base__=Block, **{"from": (float, _FROM)})
 
 
 class Span(_Span):
     """Config key and the range over which it varies."""
 
+    to: float = key(0.1, _UNIT, "end of the range", bounds="a number above `from`")
     over: str = key(
         "slope_rad",
         "",
@@ -110,14 +101,11 @@ class Span(_Span):
         pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$",
     )
 
+    _above = check_against("to", "from", lambda to, least: "" if to > least else f"must be above `from`, {least:g}")
+
     @property
     def least(self) -> float:
         return float(getattr(self, "from"))
-
-    @property
-    def most(self) -> float:
-        value: Any = getattr(self, "to")  # noqa: B009 - declared above, where the type checker cannot see it
-        return float(value)
 
 
 class Continuation(Span):
@@ -146,6 +134,12 @@ _QUANTITY_NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]
 
 
+def why_no_quantity(name: str, _bounds: list[float]) -> str:
+    """Explain why a name is not that of a gait quantity, or return '' if it is."""
+    text = f"names {name}, which is not a gait quantity; choose from {_QUANTITY_NAMES}"
+    return "" if name in get_args(Quantity) else text
+
+
 class Design(Block):
     """Optimisation problem of `walkerlab design`."""
 
@@ -164,22 +158,9 @@ class Design(Block):
         "maximise", "minimise", lambda value, _: "cannot be combined with minimise: remove one of them" if value else ""
     )
 
-    @field_validator("over", "keep")
-    @classmethod
-    def _upwards(cls, value: Bounds) -> Bounds:
-        for name, bounds in value.items():
-            if len(bounds) != 2 or bounds[0] >= bounds[1]:
-                text = ", ".join(f"{bound:g}" for bound in bounds)
-                raise meaning_error(f"has bounds for {name}, [{text}]: give two numbers, the lower one first")
-        return value
+    _rising = check_entries("over", "keep", why=why_not_rising)
 
-    @field_validator("keep")
-    @classmethod
-    def _numbers_of_a_gait(cls, value: Bounds) -> Bounds:
-        for name in value:
-            if name not in get_args(Quantity):
-                raise meaning_error(f"names {name}, which is not a gait quantity; choose from {_QUANTITY_NAMES}")
-        return value
+    _of_a_gait = check_entries("keep", why=why_no_quantity)
 
 
 class Plan(Block):
@@ -199,13 +180,9 @@ class Plan(Block):
         0.02, "1", "relative change of the start's coordinates, for walks that do not start on the gait", gt=0.0, le=0.5
     )
 
-    @field_validator("errors")
-    @classmethod
-    def _positive(cls, value: dict[str, float]) -> dict[str, float]:
-        for name, error in value.items():
-            if not error > 0.0:
-                raise meaning_error(f"has {error:g} for {name}, not a number above 0")
-        return value
+    _positive = check_entries(
+        "errors", why=lambda name, error: "" if error > 0.0 else f"has {error:g} for {name}, not a number above 0"
+    )
 
 
 _DEFAULT_ROUGHNESS_M: Final = (0.0005, 0.001, 0.002)
@@ -265,18 +242,13 @@ class Case(Block):
     agreement: float = key(
         1e-4,
         "1",
-        "largest difference of times from those of a ten times tighter tolerance or of the twin, in pendulum times",
+        "largest difference of times if a walk is repeated (tighter tolerance, other method, twin), in pendulum times",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
     twin: bool = key(False, "", "whether a twin, the walker scaled to another size, must take the same steps")
 
-    @field_validator("expected")
-    @classmethod
-    def _some_outcome_is_right(cls, value: tuple[Fate, ...]) -> tuple[Fate, ...]:
-        if not value:
-            raise meaning_error("must name an outcome")
-        return value
+    _some_outcome_is_right = check_value("expected", why=lambda outcomes: "" if outcomes else "must name an outcome")
 
 
 class Stability(Block):

@@ -4,9 +4,9 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, create_model, field_validator
+from pydantic import AfterValidator, create_model
 
-from walkerlab.config.fields import Block, Text, key, meaning_error
+from walkerlab.config.fields import Block, Text, check_value, key, meaning_error
 
 Body = Literal["swing", "stance", "shank"]
 Instant = Literal["after-strike", "before-strike", "mid-stance"]
@@ -45,7 +45,7 @@ class PrintedValue:
 
 
 def digits_of(text: str) -> Digits:
-    """Read a printed number with its digits: '-.50' has 2 digits, the last one of unit 0.01."""
+    """Read a printed number with its digits: '-.50' has 2 digits, and the unit of the last one is 0.01."""
     mantissa, _, exponent = text.lstrip("+-").partition("e")
     scale = int(exponent or 0) - len(mantissa.partition(".")[2])
     figures = mantissa.replace(".", "").lstrip("0")
@@ -153,12 +153,10 @@ class PrintedAngles(_From):
         "angles-first", "", "all angles, then all rates; or interleaved: angle, rate, angle, rate"
     )
 
-    @field_validator("order")
-    @classmethod
-    def _check_unique(cls, value: tuple[Body, ...] | None) -> tuple[Body, ...] | None:
-        if value is not None and (len(set(value)) < len(value) or not value):
-            raise meaning_error("must name each body once")
-        return value
+    _each_once = check_value(
+        "order",
+        why=lambda order: "" if order is None or 0 < len({*order}) == len(order) else "must name each body once",
+    )
 
     @property
     def origin(self) -> str:

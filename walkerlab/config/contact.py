@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, check_against, check_value, key, meaning_error
 from walkerlab.extensions import origin_of, words
 
 MM_PER_M: Final = 1000.0
@@ -49,7 +49,7 @@ class Contact(Block):
         "impact", "", "impact: the IMPACT law of ADAMS; extensions add others", _ADAMS
     )
     stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
-    exponent: float = key(2.2, "1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)
+    exponent: float = key(2.2, "1", "exponent e of the normal force, 1 for a linear spring", _ADAMS, ge=1.0, le=3.0)
     damping: float = key(90.0, "N s/mm or N s/m", "c, reached at full_damping_penetration", _FIG_4B, ge=0.0, le=1e12)
     full_damping_penetration: float = key(
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
@@ -140,11 +140,21 @@ class Contact(Block):
         return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
-        """Return the unit that this block uses, of two such as `mm or m`."""
+        """Return the unit that this block uses. `either` names the two possible ones, as in `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def to_si(self) -> Self:
         return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))
+
+
+def why_two_sources(heights: tuple[float, ...], roughness: float) -> str:
+    """Explain why heights cannot be combined with a roughness, or return '' if only one of them is given."""
+    return "cannot be combined with roughness_m: heights are either listed or drawn" if heights and roughness else ""
+
+
+def why_too_high(heights: tuple[float, ...]) -> str:
+    """Explain why heights are not allowed, or return '' if they are."""
+    return "must be numbers from -1e3 to 1e3" if any(abs(height) > 1e3 for height in heights) else ""
 
 
 class Footholds(Block):
@@ -161,20 +171,8 @@ class Footholds(Block):
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 
-    _listed = check_against(
-        "heights_m",
-        "roughness_m",
-        lambda heights, roughness: (
-            "cannot be combined with roughness_m: heights are either listed or drawn" if heights and roughness else ""
-        ),
-    )
-
-    @field_validator("heights_m")
-    @classmethod
-    def _check_heights(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if any(abs(height) > 1e3 for height in value):
-            raise meaning_error("must be numbers from -1e3 to 1e3")
-        return value
+    _listed = check_against("heights_m", "roughness_m", why_two_sources)
+    _heights = check_value("heights_m", why=why_too_high)
 
     @property
     def even(self) -> bool:

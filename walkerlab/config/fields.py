@@ -5,10 +5,10 @@ numbers.
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from functools import cache, reduce
-from itertools import chain
+from itertools import chain, starmap
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_validator
@@ -72,9 +72,8 @@ def key(
     words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
     settings: dict[str, Any] = {"default_factory" if callable(default) else "default": default, **limits}
     settings |= {"strict": False} if sequence or isinstance(default, tuple) else {}
-    return Field(
-        description=meaning, json_schema_extra={name: text for name, text in words.items() if text}, **settings
-    )
+    settings["json_schema_extra"] = {name: text for name, text in words.items() if text}
+    return Field(description=meaning, **settings)
 
 
 def meaning_error(reason: str) -> PydanticCustomError:
@@ -90,6 +89,33 @@ def _storable(text: str) -> str:
 
 Text = Annotated[str, AfterValidator(_storable)]
 """Text that a user writes, such as a name or a path."""
+
+
+def check_value(*names: str, why: Callable[[Any], str]) -> Any:
+    """Validate keys. `why` returns the reason for an error or ''."""
+
+    def check(value: Any) -> Any:
+        if reason := why(value):
+            raise meaning_error(reason)
+        return value
+
+    return field_validator(*names)(check)
+
+
+def check_entries(*names: str, why: Callable[[str, Any], str]) -> Any:
+    """Validate each entry, a name and its value, of keys that hold several."""
+    return check_value(*names, why=lambda entries: next(filter(None, starmap(why, entries.items())), ""))
+
+
+def why_not_rising(name: str, bounds: Sequence[float] | None) -> str:
+    """Explain why the bounds of `name` are not two rising numbers, or return '' if they are, or if they are None."""
+    if bounds is None or (len(bounds) == 2 and bounds[0] < bounds[1]):
+        return ""
+    return f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first"
+
+
+def listed(numbers: Sequence[float]) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
@@ -223,10 +249,9 @@ def describe_allowed(field: FieldInfo) -> str:
         optional = type(None) in get_args(field.annotation)
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
     bounds = bounds_of(field)
-    unit = annotation_of(field, "unit")
     what = describe_type(field.annotation)
     if what == "word" or bounds == ", ".join(words_of(field.annotation)) != "":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
-    return add_unit(bounds, unit)
+    return add_unit(bounds, annotation_of(field, "unit"))

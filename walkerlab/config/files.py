@@ -35,10 +35,9 @@ class ConfigFile:
 
 def is_file(path: Path) -> bool:
     """Whether a path is a file. Return False for a path that the system refuses, such as one that is too long."""
-    try:
+    with contextlib.suppress(OSError):
         return path.is_file()
-    except OSError:
-        return False
+    return False
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -47,10 +46,12 @@ def builtin_names() -> tuple[str, ...]:
 
 def config_to_extend(typed: str | None) -> str:
     """Return the config that a new one extends: `typed` if it is a file or a built-in name, otherwise the paper's."""
-    is_config = typed is not None and (
-        typed in builtin_names() or (is_file(Path(typed)) and Path(typed).suffix != ".h5")
-    )
-    return str(typed) if is_config else DEFAULT
+    return typed if typed is not None and is_config(typed) else DEFAULT
+
+
+def is_config(typed: str) -> bool:
+    """Whether a text names a built-in config, or a file that is not an artifact."""
+    return typed in builtin_names() or (is_file(Path(typed)) and Path(typed).suffix != ".h5")
 
 
 def builtin_config(name: str) -> ConfigFile:
@@ -61,9 +62,11 @@ PUBLISHED: Final = Path("published")
 """Folder of the built-in configs of published gaits."""
 
 
-def find_config(path: Path) -> ConfigFile:
+def find_config(path: Path | None) -> ConfigFile:
     """Find the config that `--config` names: an existing path, or the name of a built-in config or of a published
-    gait."""
+    gait. For None, it is the paper's."""
+    if path is None:
+        return builtin_config(DEFAULT)
     if not is_file(path):
         if str(path) in builtin_names():
             return builtin_config(str(path))
@@ -266,7 +269,7 @@ def parse_setting(text: str) -> ConfigSetting:
 
     Raises ConfigError if it is not KEY=VALUE with a YAML value.
     """
-    # A text with an attribute `source` comes from another option than --set, and messages must name that option.
+    # A text with an attribute `source` comes from an option other than --set, and messages must name that option.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -276,8 +279,7 @@ def parse_setting(text: str) -> ConfigSetting:
     if len(path) > MAX_DEPTH:
         raise problem_error(start, f"nested deeper than {MAX_DEPTH} levels")
     column = len(key) + 2
-    node = read(value, source, column)
-    return ConfigSetting(path, node or Scalar(Position(source, 1, column), None, ""), start)
+    return ConfigSetting(path, read(value, source, column) or Scalar(Position(source, 1, column), None, ""), start)
 
 
 def option_setting(key: str, value: int | str) -> ConfigSetting:
@@ -288,7 +290,7 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockNode:
     """Apply settings in order. Lists and blocks are replaced, not merged.
 
-    Raises ConfigError if a key's parent is no block.
+    Raises ConfigError if a key's parent is not a block.
     """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     copies: dict[int, BlockNode] = {}
@@ -312,10 +314,8 @@ def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies:
     if inner is None or (isinstance(inner, Scalar) and inner.value is None):
         inner = BlockNode(setting.position)
     if not isinstance(inner, BlockNode):
-        above = ".".join(setting.path[: depth + 1])
-        full_key = ".".join(setting.path)
-        raise problem_error(
-            setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
-        )
+        above = printable(".".join(setting.path[: depth + 1]))
+        full_key = printable(".".join(setting.path))
+        raise problem_error(setting.position, f"{full_key}: {above} is a value, not a block of keys")
     result.put(name, _place_setting(inner, setting, depth + 1, copies), block.keys.get(name, setting.position))
     return result

@@ -1,10 +1,10 @@
 """The identify block: a measured walk, and the parameters to estimate from it."""
 
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Text, check_against, key, meaning_error
+from walkerlab.config.fields import Text, check_against, check_entries, key, listed, why_not_rising
 from walkerlab.config.recording import Recorded
 
 Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
@@ -12,11 +12,23 @@ OFFSET: Final = "angle_offset_rad"
 Pair = list[float]
 
 
+def why_two_offsets(nuisance: tuple[Nuisance, ...], tilt: Any) -> str:
+    """Explain why an offset of the angles would be estimated twice, or return '' if it is not."""
+    twice = tilt == "free" and OFFSET in nuisance
+    return f"has {OFFSET}, which camera_tilt_deg: free estimates already: leave out one of both" if twice else ""
+
+
+def why_no_deviation(name: str, pair: Pair) -> str:
+    """Explain why the prior of `name` is not a value and a standard deviation, or return '' if it is."""
+    good = len(pair) == 2 and pair[1] > 0.0
+    return "" if good else f"has [{listed(pair)}] for {name}, not a value and a standard deviation above 0"
+
+
 class Identify(Recorded):
     """Estimation problem of `walkerlab identify`."""
 
     data: Text = key(
-        "", "", "file with the measured walk", bounds="a path, from the current folder", default_in_words="none"
+        "", "", "file with the measured walk", bounds="a path, relative to the current folder", default_in_words="none"
     )
     level: Literal["steps", "angles"] = key(
         "steps", "", "steps: period (and length and touch angle if measured) of each step; angles: leg angles over time"
@@ -64,15 +76,7 @@ class Identify(Recorded):
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )
-    _one_offset = check_against(
-        "nuisance",
-        "camera_tilt_deg",
-        lambda nuisance, tilt: (
-            f"has {OFFSET}, which camera_tilt_deg: free estimates already: leave out one of both"
-            if tilt == "free" and OFFSET in nuisance
-            else ""
-        ),
-    )
+    _one_offset = check_against("nuisance", "camera_tilt_deg", why_two_offsets)
 
     @property
     def sensors(self) -> tuple[Nuisance, ...]:
@@ -92,27 +96,11 @@ class Identify(Recorded):
     def models(self) -> tuple[str, ...]:
         return ("rigid", "contact") if self.model == "both" else (self.model,)
 
-    @field_validator("fit")
-    @classmethod
-    def _upwards(cls, value: dict[str, Pair | None]) -> dict[str, Pair | None]:
-        for name, bounds in value.items():
-            if bounds is not None and (len(bounds) != 2 or bounds[0] >= bounds[1]):
-                raise meaning_error(f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first")
-        return value
+    _rising = check_entries("fit", why=why_not_rising)
 
-    @field_validator("prior")
-    @classmethod
-    def _check_deviations(cls, value: dict[str, Pair]) -> dict[str, Pair]:
-        for name, pair in value.items():
-            if len(pair) != 2 or pair[1] <= 0.0:
-                raise meaning_error(f"has [{listed(pair)}] for {name}, not a value and a standard deviation above 0")
-        return value
+    _deviations = check_entries("prior", why=why_no_deviation)
 
     @field_validator("nuisance")
     @classmethod
     def _remove_duplicates(cls, value: tuple[Nuisance, ...]) -> tuple[Nuisance, ...]:
         return tuple(dict.fromkeys(value))
-
-
-def listed(numbers: Pair) -> str:
-    return ", ".join(f"{number:g}" for number in numbers)

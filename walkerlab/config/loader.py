@@ -18,7 +18,7 @@ from walkerlab.config.fields import block_of, short_number
 from walkerlab.config.problems import Problem, problem_error
 from walkerlab.config.reads import flatten
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar
-from walkerlab.config.validation import Location, align_start, key_at, node_at, validate_tree
+from walkerlab.config.validation import align_start, key_at, node_at, validate_tree
 from walkerlab.errors import ConfigError
 
 IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
@@ -78,13 +78,7 @@ def load(
 
     Raises a ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
-    file = (
-        path
-        if isinstance(path, files.ConfigFile)
-        else files.builtin_config(files.DEFAULT)
-        if path is None
-        else files.find_config(path)
-    )
+    file = path if isinstance(path, files.ConfigFile) else files.find_config(path)
     tree = files.merge_layers(files.read_layers(file))
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:
@@ -106,7 +100,7 @@ def load(
     changes = (*(earlier for earlier in file.changes if key_of(earlier) not in keys), *new)
     if changed.name != base.name:
         folder = run_name(changed.name, new)
-    elif file.text is not None and not new:  # an unchanged run keeps its folder, however that is named
+    elif file.text is not None and not new:  # an unchanged run keeps its folder, whatever its name
         folder = file.path.name
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
@@ -153,21 +147,14 @@ def suspicious_values(config: schema.Config, tree: BlockNode) -> Iterator[str]:
     if contact is not None and contact.terrain != "checkerboard" and not isinstance(contact.pad_pitch, str):
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
         yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has pads"))
-    for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
-        key = str(path[-1])
-        text = f"{'.'.join(map(str, path))} is {short_number(value)}"
-        if key.endswith("length_m") and value > IMPLAUSIBLE_LENGTH_M:
-            yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
-        if key.endswith("mass_kg") and value > WATER_KG_M3 * walker.leg_length_m**3:
-            yield str(Problem(key_at(tree, path), f"{text} kg on legs of {length} m; masses are in kg, not in g"))
-
-
-def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
-    if isinstance(value, dict | list):
-        for name, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from numbers_in((*path, name), inner)
-    elif isinstance(value, int | float):
-        yield path, float(value)
+    entries = flatten(walker.model_dump(mode="json"), lists=True)
+    for name, value in ((name, value) for name, value in entries if isinstance(value, int | float)):
+        place = key_at(tree, ("walker", *(int(part) if part.isdigit() else part for part in name.split("."))))
+        text = f"walker.{name} is {short_number(value)}"
+        if name.endswith("length_m") and value > IMPLAUSIBLE_LENGTH_M:
+            yield str(Problem(place, f"{text} m; lengths are in m, not in mm"))
+        if name.endswith("mass_kg") and value > WATER_KG_M3 * walker.leg_length_m**3:
+            yield str(Problem(place, f"{text} kg on legs of {length} m; masses are in kg, not in g"))
 
 
 MAX_NAME: Final = 40
@@ -280,16 +267,15 @@ def check_ground(case: analyses.Case, config: schema.Config, lines: BlockNode) -
 
 
 def tree_of(block: Mapping[str, Any], position: Position) -> BlockNode:
-    """Convert plain (or NumPy) values by key to a tree, all at one position."""
+    """Convert plain (or NumPy) values by key to a tree whose nodes all have the same position."""
 
     def node(value: Any) -> Node:
         if isinstance(value, Mapping):
             return tree_of(value, position)
         if isinstance(value, list | tuple):
             return ListNode(position, [node(item) for item in value])
-        if hasattr(value, "tolist"):  # a NumPy array or number
-            return node(value.tolist())
-        return Scalar(position, value, str(value))
+        # NumPy's arrays and numbers have `tolist`.
+        return node(value.tolist()) if hasattr(value, "tolist") else Scalar(position, value, str(value))
 
     tree = BlockNode(position)
     for name, value in block.items():

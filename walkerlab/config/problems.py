@@ -48,7 +48,7 @@ def problems_error(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -
 def problem_error(
     position: Position | None, text: str, allowed: str = "", near: str = "", advice: str = KEYS_ARE_LISTED
 ) -> ConfigError:
-    """Build the error for a single problem, whose fields are those of `Problem`."""
+    """Build the error for a single problem. The arguments before `advice` are the fields of `Problem`."""
     return problems_error([Problem(position, text, allowed, near)], advice)
 
 

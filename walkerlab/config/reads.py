@@ -37,7 +37,7 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # A type that is no Protocol is a config block, which is read completely.
+    # A type that is not a Protocol is a config block, which is read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
@@ -234,11 +234,8 @@ class CheckConfig(FixedPointConfig, Protocol):
     def check(self) -> Check | None: ...
 
 
-class PlanConfig(FixedPointConfig, ContactConfig, Protocol):
+class PlanConfig(IdentifyConfig, Protocol):
     """Keys that `plan` reads."""
-
-    @property
-    def identify(self) -> Identify | None: ...
 
     @property
     def plan(self) -> Plan | None: ...

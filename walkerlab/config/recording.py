@@ -52,13 +52,13 @@ class Recorded(Block):
     fps: float | None = key(
         None,
         "1/s",
-        "frames per second of the film, for files that count frames or whose times are those of another frame rate",
+        "frames per second of the film, for files that count frames or whose times assume another frame rate",
         ge=1e-3,
         le=1e7,
         default_in_words="times as in the file",
     )
     from_s: float | None = key(
-        None, "s", "time from which on the recording is read", bounds="any number", default_in_words="the first sample"
+        None, "s", "time from which the recording is read", bounds="any number", default_in_words="the first sample"
     )
     to_s: float | None = key(
         None,

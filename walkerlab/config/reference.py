@@ -38,16 +38,8 @@ class KeyReference:
 
 def keys() -> Iterator[KeyReference]:
     """Yield every key of a config file, in the schema's order."""
-    builtins = ", ".join(files.builtin_names())
-    yield KeyReference(
-        key="extends",
-        type="text",
-        unit="",
-        bounds=f"a file, {builtins}",
-        default="none",
-        meaning=EXTENDS_MEANING,
-        source="this project",
-    )
+    extends = fields.key(None, "", EXTENDS_MEANING, bounds=f"a file, {', '.join(files.builtin_names())}")
+    yield _reference(("extends",), FieldInfo.from_annotated_attribute(str, extends))
     for path, field in fields.leaves(Config):
         yield _reference(path, field)
         if path == ("slope_rad",):
@@ -99,11 +91,8 @@ def select_keys(selection: str) -> list[KeyReference]:
     Raises ConfigError with the nearest key if none match.
     """
     plain = {key: KIND_SUFFIX.sub("", key.key) for key in keys()}
-    matches = [
-        key
-        for key in plain
-        if not selection or any(f"{name}.".startswith(f"{selection}.") for name in (key.key, plain[key]))
-    ]
+    beginning = f"{selection}." if selection else ""
+    matches = [key for key in plain if any(f"{name}.".startswith(beginning) for name in (key.key, plain[key]))]
     if not matches:
         names = dict.fromkeys(".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3))
         similar = " or ".join([name for name in names if selection in name.split(".")[-1]][:SHOWN_KEYS])

@@ -12,7 +12,7 @@ from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustn
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact, Footholds
 from walkerlab.config.drives import PushOff, drives_and_springs_of, push_offs
-from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
+from walkerlab.config.fields import Block, Text, check_against, check_value, key, meaning_error
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
 from walkerlab.extensions import words
@@ -119,6 +119,12 @@ def absolute(default: float) -> Any:
     return key(default, "rad, rad/s, m, m/s", "absolute tolerance", _MEASURED, gt=0.0, le=1.0)
 
 
+def why_not_installed(method: Method) -> str:
+    """Explain why a method cannot be used here, or return '' if it can."""
+    missing = method.startswith("cvode") and find_spec(CVODE_PACKAGE) is None
+    return "needs CVODE, which is not installed: pip install scikit-sundae" if missing else ""
+
+
 class SolverSettings(Block):
     """Integration settings of one model."""
 
@@ -126,12 +132,7 @@ class SolverSettings(Block):
     rtol: float = relative(1.0e-10)
     atol: float = absolute(1.0e-12)
 
-    @field_validator("method")
-    @classmethod
-    def _is_installed(cls, value: Method) -> Method:
-        if value.startswith("cvode") and find_spec(CVODE_PACKAGE) is None:
-            raise meaning_error("needs CVODE, which is not installed: pip install scikit-sundae")
-        return value
+    _installed = check_value("method", why=why_not_installed)
 
 
 class RigidSolver(SolverSettings):
@@ -158,6 +159,10 @@ def factors(least: float, most: float, velocity: str) -> Any:
     return key((least, most), "1", f"smallest and largest factor by which the {velocity} is multiplied", bounds=bounds)
 
 
+def why_not_upwards(pair: Factors) -> str:
+    return "" if pair[0] < pair[1] else "the first must be below the second"
+
+
 class Tune(Block):
     """Settings for adjusting the two initial angular velocities until the contact model walks."""
 
@@ -175,12 +180,7 @@ class Tune(Block):
         True, "", "whether to also stiffen the contact towards the rigid limit, to find where deviations fall to 1e-4"
     )
 
-    @field_validator("swing_factors", "stance_factors")
-    @classmethod
-    def _rising(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value[0] >= value[1]:
-            raise meaning_error("the first must be below the second")
-        return value
+    _rising = check_value("swing_factors", "stance_factors", why=why_not_upwards)
 
 
 QUESTIONS: Final = (

@@ -3,6 +3,7 @@
 from typing import Any, Literal
 
 from walkerlab.config.fields import Block, key
+from walkerlab.config.reads import flatten
 
 
 def second_leg(unit: str, least: float | None = None) -> Any:
@@ -81,8 +82,7 @@ class SecondPushOff(Block):
 
 
 def states_second_leg(config: Any) -> bool:
-    """Whether a config has keys for leg 2 or its push-off. A walker whose type has no `leg_2` counts as one that
-    has."""
+    """Whether a config has keys for leg 2 or its push-off. Also true for a walker whose type has no key `leg_2`."""
     return getattr(config.walker, "leg_2", ...) is not None or config.push_off.leg_2 is not None
 
 
@@ -90,11 +90,7 @@ def describe_second_leg(walker: Any) -> str:
     """Describe the keys of leg 2 that a config states, with their values, or return '' if it states none."""
     leg = getattr(walker, "leg_2", None)
     keys = {} if leg is None else leg.model_dump(exclude_none=True)
-    stated = []
-    for name, value in keys.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        stated += [f"{f'{name}.{key}' if key else name}: {each}" for key, each in inner.items()]
-    return ", ".join(stated)
+    return ", ".join(f"{name}: {value}" for name, value in flatten(keys))
 
 
 def lock_knee(thigh: Any, shank: Any) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """Untyped tree of a config text: scalars, lists and blocks, each with its position."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -60,18 +61,15 @@ Node: TypeAlias = Scalar | ListNode | BlockNode
 Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
 
 
-def plain(node: Node) -> Data:
+def plain(node: Node, value_of: Callable[[Scalar], Data] = lambda scalar: scalar.value) -> Data:
+    """Convert a node to plain data. `value_of` converts its scalars."""
     if isinstance(node, Scalar):
-        return node.value
+        return value_of(node)
     if isinstance(node, ListNode):
-        return [plain(item) for item in node.items]
-    return {name: plain(entry) for name, entry in node.entries.items()}
+        return [plain(item, value_of) for item in node.items]
+    return {name: plain(entry, value_of) for name, entry in node.entries.items()}
 
 
 def as_typed(node: Node) -> Data:
     """Convert a node as `plain` does, but keep numbers as text, as they were typed."""
-    if isinstance(node, Scalar):
-        return None if node.value is None else node.text
-    if isinstance(node, ListNode):
-        return [as_typed(item) for item in node.items]
-    return {name: as_typed(entry) for name, entry in node.entries.items()}
+    return plain(node, lambda scalar: None if scalar.value is None else scalar.text)

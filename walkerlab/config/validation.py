@@ -29,16 +29,11 @@ _REASONS: Final = {
     "float_type": "is not a number",
     "int_type": "is not an integer",
     "string_type": "is not text",
-    "tuple_type": "is not a list",
-    "list_type": "is not a list",
-    "dict_type": "is not a block of keys",
-    "model_type": "is not a block of keys",
+    **dict.fromkeys(("tuple_type", "list_type"), "is not a list"),
+    **dict.fromkeys(("dict_type", "model_type"), "is not a block of keys"),
     "finite_number": "is not finite",
     "literal_error": "is not allowed",
-    "greater_than": "is out of bounds",
-    "greater_than_equal": "is out of bounds",
-    "less_than": "is out of bounds",
-    "less_than_equal": "is out of bounds",
+    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), "is out of bounds"),
     "missing": "has too few values",
     "too_long": "has too many values",
     "string_pattern_mismatch": "is not valid",
@@ -47,9 +42,7 @@ _REASONS: Final = {
 MAX_PROBLEMS: Final = 100
 NAMES_OF_BODIES: Final = {
     "hinges": ("parent", "child"),
-    "particles": ("body",),
-    "feet": ("body",),
-    "couplings": ("body",),
+    **dict.fromkeys(("particles", "feet", "couplings"), ("body",)),
 }
 MOVED_RAD: Final = 1e-12
 MAX_START_ERROR: Final = 0.01  # rad or rad/s; a start is rejected if a stated value is off by more than this
@@ -74,9 +67,8 @@ def validate_tree(tree: BlockNode) -> schema.Config:
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
     # The schema has only slope_rad. A slope in degrees is validated by another model and then converted.
     if "slope_deg" in data:
-        degrees = data.pop("slope_deg")
         try:
-            data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=degrees).slope_deg)
+            data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=data.pop("slope_deg")).slope_deg)
         except ValidationError as error:
             problems += _problems(error, tree, schema.SlopeInDegrees)
     try:
@@ -90,7 +82,7 @@ def validate_tree(tree: BlockNode) -> schema.Config:
 
 
 class FollowingValue(NamedTuple):
-    """Value of a start that follows from others."""
+    """Start value that is computed from other values of the config."""
 
     name: str
     value: float
@@ -248,7 +240,10 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
 
 
 def advise_extensions() -> str:
-    """Return the part of an advice that names extensions, since one of them may add the missing word."""
+    """Return the end of an error message, which lists the installed extensions.
+
+    Another extension may add the missing word.
+    """
     names = ", ".join(found.name for found in external_extensions() if found.extension) or "none"
     return f", or a word of an extension: install the one that adds it (installed: {names})"
 
@@ -337,8 +332,7 @@ def _find_key_elsewhere(name: str, exactly: bool) -> str:
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
         return f"{': {'.join(blocks)}: {{{last}: …{'}' * len(blocks)}" if blocks else last
-    match = name if exactly else nearest(name, paths)
-    return paths.get(match, "")
+    return paths.get(name if exactly else nearest(name, paths), "")
 
 
 def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:

@@ -57,8 +57,7 @@ def name_key(meaning: str) -> Any:
 
 
 def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -> Any:
-    bounds = f"blocks of {number}{', '.join(of.model_fields)}"
-    return key(default, "", meaning, bounds=bounds, sequence=True)
+    return key(default, "", meaning, bounds=f"blocks of {number}{', '.join(of.model_fields)}", sequence=True)
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
@@ -105,8 +104,7 @@ class _Legged(Block):
     @property
     def lean_rad(self: Any) -> float:
         """Angle (rad) from the line of a leg to the line from hip to foot centre, or 0 for walkers of parts."""
-        ahead = getattr(self, "foot_centre_ahead_m", 0.0)
-        return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
+        return math.atan2(getattr(self, "foot_centre_ahead_m", 0.0), self.leg_length_m - self.foot_radius_m)
 
     def swing_angle(self: Any, stance_rad: float) -> float | None:
         """Return the angle (rad) at which leg 1 touches the ground behind leg 2, which stands at `stance_rad`.
@@ -173,7 +171,7 @@ def check_second_leg() -> Any:
 
 
 def double_second_leg(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
-    """Build the walker whose legs are both like `leg`. `values` are the keys of the walker by name."""
+    """Build the walker whose legs are both like `leg`. `values` maps the walker's keys to their values."""
     second = {name: value for name, value in values.items() if name != "leg_2"}
     if getattr(leg, "type", None) is not None:
         shared = {
@@ -397,8 +395,9 @@ class PartCoupling(Block):
 class AssembledWalker(_Legged):
     """A walker made of parts.
 
-    An extension derives a type of walker from this class. The derived class has further keys, properties that make the
-    parts from these keys, `leg_length_m`, and the keys `knee`, `torso` and `hip`, as in `PartsWalker`.
+    An extension derives a type of walker from this class. The derived class adds its own keys and the
+    properties that make the parts from them. It also needs the keys `leg_length_m`, `knee`, `torso` and `hip`, as in
+    `PartsWalker`.
     """
 
     if TYPE_CHECKING:
@@ -453,7 +452,7 @@ class PartsWalker(AssembledWalker):
     @classmethod
     def _agrees_with_the_soles(cls, value: float, info: ValidationInfo) -> float:
         if {"hinges", "feet", "legs"} - info.data.keys():
-            return value  # those keys are invalid, which is reported already
+            return value  # those keys are invalid, which has already been reported
         length = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
         if length is None or math.isclose(value, length, rel_tol=LEG_LENGTH_DIGITS):
             return value

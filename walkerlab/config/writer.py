@@ -22,7 +22,7 @@ def to_yaml(config: schema.Config) -> str:
 
 
 def to_extending_yaml(start: str, base: schema.Config, changed: schema.Config, name: str) -> str:
-    """Write only the keys that differ from `base` as YAML that extends `base` by the name `start`."""
+    """Return YAML that extends `start`, the file or built-in name of `base`, by the keys that differ from it."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
     degrees = slope_in_degrees(changed.slope_rad)
@@ -113,13 +113,9 @@ def _value(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(_value(item) for item in value)}]"
     if isinstance(value, float):
-        return _number(value)
+        # YAML 1.1 readers see a number only if there is a decimal point, even before an exponent.
+        text = repr(value)
+        return text if "." in text else text.replace("e", ".0e")
     if isinstance(value, str) and reader.value_of(value) == value and not PUNCTUATION.search(value):
         return value
     return json.dumps(value)
-
-
-def _number(value: float) -> str:
-    """Format a number with a decimal point even before an exponent, so that YAML 1.1 readers also see a number."""
-    text = repr(value)
-    return text if "." in text else text.replace("e", ".0e")

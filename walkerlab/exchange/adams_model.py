@@ -173,7 +173,7 @@ class AdamsModel:
         return {name: number for kind in kinds for number, name in enumerate(kind, start=1)}
 
     def commands(self, end_s: float, pinned_until_s: float | None) -> Iterator[str]:
-        """Yield the solver commands that simulate the walk, also for a script of Adams View.
+        """Yield the solver commands that simulate the walk. A script for Adams View contains them, too.
 
         end_s           end of walkerlab's walk (s)
         pinned_until_s  time (s) at which a pinned stance foot is released, or None if no foot is pinned
@@ -280,7 +280,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         weights = {f"hinge_of_{names[link]}": weight for link, weight in coupling.items()}
         model.couplers[f"coupler_{number + 1}"] = weights
     for foot, ball in enumerate(planar.balls):
-        # Parts turn only about the normal of the plane, so each ball keeps its distance from the plane and its lane.
+        # Parts turn only about the plane's normal, so each ball stays in its lane, at a fixed distance from the plane.
         name = names[ball.link]
         model.markers[f"{name}.foot"] = marker_at(name, ball.centre_m)
         model.markers[f"{name}.ball"] = marker_at(name, ball.centre_m, export.lane_across_m(foot))
@@ -330,7 +330,7 @@ class FootTerms:
 
     @property
     def slip(self) -> str:
-        """Slip velocity (mm/s): velocity along the slope of the material at the lowest point of the foot."""
+        """Slip velocity of the foot (mm/s): velocity of its lowest material point along the slope."""
         rolling = f"+{finite(self.radius)}*WZ({{{self.marker}}},{{{ORIGIN}}})" if self.radius else ""
         return f"VX({self.motion}){rolling}"
 

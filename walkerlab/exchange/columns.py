@@ -47,11 +47,11 @@ UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Name of a quantity: position (m) along the walk of the upper marker of the first line, if angles are those of
-lines.
+"""Name of the quantity that holds the position (m), in the direction of the walk, of the upper marker of the first
+line. It exists if the angles are computed from lines between markers.
 """
 SAMPLE: Final = "sample"
-"""Name of a quantity: number of each sample in the file, counted from 1."""
+"""Name of the quantity that numbers the samples of the file, counted from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
 SIGN_AND_OFFSET: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
 """Pattern for a column with an optional minus sign and an added constant, such as -NAME+90deg."""
@@ -101,10 +101,10 @@ class ColumnSource:
 def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
-    asked      statements of the user about the file
+    asked      what the user says about the file
     slope_rad  slope of the ground, for angles from the floor's normal
 
-    Raises ConfigError for a column or unit that is unknown or missing, for gaps, and for running.
+    Raises ConfigError if a column or unit is unknown or missing, if there are gaps, or if the recording shows running.
     """
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
@@ -287,7 +287,7 @@ def add_lines(
 ) -> RecordedWalk:
     """Add the angles of lines between markers (by quantity) to a walk.
 
-    Raises ConfigError for running.
+    Raises ConfigError if the recording shows running, not walking.
     """
     lines, swaps = swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
     named = {walk.sources[name]: line for name, line in lines.items()}
@@ -392,7 +392,7 @@ def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | sli
 
 
 def refuse_order(path: Path, time: Array) -> None:
-    """Raise ConfigError unless there are at least two times and they rise strictly."""
+    """Raise ConfigError unless there are at least two times, in strictly ascending order."""
     if time.size < 2:
         raise ConfigError(f"{path} has {time.size} samples, but a walk needs at least two.", "Record a longer walk.")
     steps_back = np.flatnonzero(np.diff(time) <= 0.0)
@@ -607,7 +607,7 @@ def stated_unit(recording: Recording, name: str, source: str, kind: str, units: 
     known = value_in_si(of_file, kind)
     if of_user and known is not None and value_in_si(of_user, kind) != known:
         raise ConfigError(
-            f"{recording.path} states that {source!r} ({name}) is in {of_file}, but --units that it is in {of_user}.",
+            f"{recording.path} states that {source!r} ({name}) is in {of_file}, but --units says {of_user}.",
             "Leave out that unit, or correct the one in the file.",
         )
     return of_user or of_file
@@ -621,7 +621,9 @@ def unknown_unit_error(recording: Recording, unit: str, name: str, kind: str) ->
 
 
 def states_unit(recording: Recording, column: str, units: Mapping[str, str]) -> bool:
-    """Whether the user or the file states the unit of this leg angle, not only that of all angles in the file."""
+    """Whether the user or the file states the unit of this leg angle. A unit that the file states for all its angles
+    does not count.
+    """
     named = ends_of(recording, column) or column in recording.units or unit_in_name(column, "angle")
     return bool(named or not units.keys().isdisjoint((column, "angle 1", "angle")))
 

@@ -16,7 +16,7 @@ from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_poin
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-# Ratio of tangential to normal force of a standing foot. It is about the mean over a walk.
+# Ratio of tangential to normal force of a standing foot. It is close to the mean over a walk.
 CREEP_LOAD = 0.1
 
 

@@ -75,7 +75,7 @@ def export_model(
 
 
 def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Choice:
-    """Return the choice that the text of an option names.
+    """Return the choice whose name is the text of an option.
 
     Raises ConfigError for an unknown name.
     """
@@ -86,12 +86,12 @@ def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Ch
 
 
 def parse_law(text: str) -> Law:
-    """Return the ADAMS contact law that `text` names. Raises the error of `choose` for an unknown name."""
+    """Return the ADAMS contact law with the name `text`. Raises the same error as `choose` if there is no such law."""
     return choose(text, CONTACT_LAWS, "--law", "contact law")
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way to express a slope that `text` names. Raises the error of `choose` for an unknown name."""
+    """Return the way to express a slope whose name is `text`. Raises the same error as `choose` if there is none."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 

@@ -67,7 +67,7 @@ class Exported:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Unique names of the links that other programs accept. Link 0 is the first stance leg, hinged at the hip."""
+        """Unique names of the links, valid in other programs. Link 0 is the first stance leg, hinged at the hip."""
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)

@@ -32,7 +32,7 @@ from walkerlab.exchange.touches import (
 )
 
 UPRIGHT_RAD: Final = math.pi / 4  # largest credible median of a leg angle from the vertical
-MIN_PASSING_SAMPLES: Final = 3  # minimum number of sample intervals in which the legs pass each other
+MIN_PASSING_SAMPLES: Final = 3  # the legs must take at least this many sample intervals to pass each other
 NOISY_RATIO: Final = 0.02  # ratio of noise to amplitude above which times of single steps are wrong by several per cent
 MIN_VARIANCE: Final = 1e-30  # rad^2; added to variances, because they may be zero
 # highest degree of the polynomial through a step; with it, the error is 0.1 mrad for straight legs
@@ -43,10 +43,13 @@ FAR_PERCENT: Final = 80  # legs are far apart if the angle between them is above
 SEARCH_RANGE: Final = 0.3
 MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
 MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
-MAX_MOTION: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
-MIN_TIME_AHEAD: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
-MAX_STRETCH: Final = 0.3  # a leg that is off its course for longer than this fraction of a step has jumped
-BORDER: Final = 0.1  # fraction of a step at either end of a fit that other fits cover
+# a leg has jumped if its motion between two samples is above this multiple of the percentile FAR_PERCENT of motions
+MAX_MOTION: Final = 6.0
+# a leg counts as far ahead only if it stays so for this fraction of the percentile FAR_PERCENT of such times
+MIN_TIME_AHEAD: Final = 0.25
+MAX_STRETCH: Final = 0.3  # a leg that is off its curve for longer than this fraction of a step has jumped
+# A stretch that is closer than this fraction of a step to an end of a fit is left to the fits of neighbouring strikes.
+BORDER: Final = 0.1
 LASTING_BORDER: Final = 0.15  # the same for lasting jumps
 LENGTH_TRIALS: Final = 16  # number of lengths that are tried first for a stretch
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
@@ -61,7 +64,8 @@ MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the 
 JOINT_SEARCH_FRACTION: Final = 0.5
 MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
 MAX_STRETCHES: Final = 30  # maximum number of stretches in the steps around a strike
-MIN_NORM: Final = 0.12  # minimum squared part of a stretch, in samples, that polynomials cannot follow
+# A stretch is tested only if the part of it that polynomials cannot follow has at least this squared norm (samples).
+MIN_NORM: Final = 0.12
 
 
 @dataclass(frozen=True)
@@ -260,21 +264,21 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
 # Smooth course of the angles ------------------------------------------------------------------------------------------
 
 # Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before
-# and the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off that
-# course if a constant added to it explains much more of the residuals than scatter does, and more than in typical
+# and the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off its
+# curve if a constant added to it explains much more of the residuals than scatter does, and more than in typical
 # steps. The strike is located again for every stretch, because a wrong sample near a strike moves it.
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Stretch of samples of a leg that lies on a smooth course if a constant is subtracted."""
+    """Stretch of samples of a leg that lies on a smooth curve if a constant is subtracted."""
 
     leg: int
     first: int
     end: int  # first sample after the stretch
     offset_rad: float
     explained: float  # sum of squared residuals (rad^2) that the offset explains
-    lasts: bool  # whether the angle never returns to its course
+    lasts: bool  # whether the angle never returns to its curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,9 +289,9 @@ class Strike:
     angle: Array
     rows: NDArray[np.int64]  # indices of the samples in the recording
     span_s: tuple[float, float]
-    smooth_instant: float  # instant of the strike (s) in a smooth course
+    smooth_instant: float  # instant of the strike (s), if the samples before and after it are on smooth curves
     step_s: float
-    at_ends: tuple[bool, bool]  # whether the recording begins and ends with these samples
+    at_ends: tuple[bool, bool]  # whether the recording begins with these samples, and whether it ends with them
 
     def fit(self, at: float) -> tuple[Array, Array]:
         """Fit polynomials that meet at an instant. Return their orthonormal basis (samples, columns) and the
@@ -305,13 +309,11 @@ class Strike:
 
     @cached_property
     def smooth_fit(self) -> tuple[Array, Array]:
-        """Basis and residuals of the fit of a smooth course."""
+        """Basis and residuals of the fit of smooth curves."""
         return self.fit(self.smooth_instant)
 
     def scatter(self) -> Array:
-        """Return the residuals of the smooth course. They are scaled up, because the fit follows part of the
-        scatter.
-        """
+        """Return the residuals of the smooth fit. They are scaled up, because the fit follows part of the scatter."""
         basis, residuals = self.smooth_fit
         free = 1.0 - np.sum(basis**2, axis=1)
         clear = free > MIN_NORM
@@ -364,11 +366,11 @@ class Strike:
 
 
 def find_instants(spans: Array, costs_at: Callable[[Array], Array], *counts: int) -> Array:
-    """Return the instants (spans,) with the smallest costs (s).
+    """Return the instant (s) with the smallest cost in each span.
 
     spans     (spans, 2) s, where to search
     costs_at  function that returns the costs of instants (spans, trials)
-    counts    numbers of trials, each in a smaller interval
+    counts    number of trials in each round. Later rounds search a smaller interval around the best trial
     """
     begin, end = spans.T
     each = np.arange(len(spans))
@@ -391,7 +393,8 @@ def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> 
 
 
 def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return, for each span (first, end), how much of a jump there a fit does not follow, and the sums of residuals.
+    """Return, for each span (first, end), the squared norm of the part of a unit offset that a fit does not follow, and
+    the sums of the residuals.
 
     sums  cumulative sums of the fit's orthonormal basis and of its residuals
     """
@@ -401,7 +404,7 @@ def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Ar
 
 
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Return first sample, end and leg of the span that explains most of the residuals."""
+    """Return the first sample, the end and the leg of the span that explains more of the residuals than any other."""
     norm, share = parts_of(sums, spans)
     # In some spans, polynomials can follow a constant almost completely. Dividing by the rest would magnify rounding.
     explained = np.where(norm > MIN_NORM, 1.0 / np.maximum(norm, MIN_NORM), 0.0)[:, None] * share**2
@@ -410,7 +413,7 @@ def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int
 
 
 def find_stretches(time: Array, angle: Array) -> list[Stretch]:
-    """Find the stretches of samples of the recording in which a leg is off its smooth course.
+    """Find the stretches of samples of the recording in which a leg is off its smooth curve.
 
     time   (samples,) s, rising
     angle  (samples, 2) rad, from the vertical
@@ -475,7 +478,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     found: list[Stretch] = []
     while len(found) < MAX_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
-    # Each stretch was found before the later ones. With them, it may no longer be needed.
+    # Each stretch was found without the later ones. With them, it may no longer be needed.
     for stretch in found[:-1]:
         others = [other for other in found if other is not stretch]
         found = found if worst(others) else others
@@ -545,7 +548,7 @@ class Course:
     def smooth_instants(
         self, slices: Sequence[slice], spans: Sequence[tuple[float, float]], *counts: int
     ) -> list[float]:
-        """Return the instants (s) of strikes in a smooth course through some samples."""
+        """Return the instants (s) of strikes, if the samples before and after them are on smooth curves."""
         parts = [(self.time[near], self.angle[near]) for near in slices]
 
         def costs_at(instants: Array) -> Array:
@@ -558,8 +561,8 @@ class Course:
 
 
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
-    """Return the course of a recording without some stretches. Each span in which one leg is far ahead contains a jump
-    of the rates.
+    """Build the course of a recording after removing `stretches`. Each span in which one leg is far ahead contains a
+    jump of the rates.
     """
     course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
     time = course.time

@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk is along the horizontal line on which the legs move most relative to each other. Which of the two directions it
-has shows only when the legs pass each other, see `leg_angles`.
+The walk is along the horizontal line on which the legs move most relative to each other. The direction
+of the walk along this line shows only when the legs pass each other (see `leg_angles`).
 """
 
 from __future__ import annotations
@@ -19,27 +19,28 @@ from walkerlab.exchange.touches import Array, apart_runs
 Line = tuple[Array, Array]
 """Positions (samples, axes) of the upper and the lower marker (m)."""
 
-MAX_NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
+MAX_NAMED: Final = 3  # a message lists at most this many stretches of samples
 MIN_JUMP: Final = 8.0  # smallest change of length that counts as a jump, in standard deviations of all changes
-MIN_RELATIVE_JUMP: Final = 0.01  # the same as a fraction of the length
-NEIGHBOURS: Final = 5  # number of neighbouring changes with whose median a change is compared
+MIN_RELATIVE_JUMP: Final = 0.01  # smallest change that counts as a jump, as a fraction of the length
+NEIGHBOURS: Final = 5  # a change is compared with the median of this many changes around it
 MAX_VALUE: Final = 1e50  # values above this count as gaps, because their squares overflow
 MIN_FROZEN: Final = 3  # minimum number of missing samples for which a marker counts as frozen
-# maximum number of samples of normal motion that a leap covers, as a multiple of the frozen samples before it
+# a leap covers the motion of at most this many normal samples for each frozen sample before it
 MAX_LEAP: Final = 1.5
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 MAX_SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
 MAX_HIP_MOTION: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
 MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
-# correlation of hip height with the distance of the feet above which a walk is a run; near -1 in walking
+# The motion is running if the correlation of hip height with the distance between the feet is above this. In walking
+# it is near -1.
 RUNNING_CORRELATION: Final = 0.5
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
 FAST_PERCENT: Final = 80  # motions between samples are fast above this percentile
-# An exchange of legs lowers the squared unevenness by at least this many squared fast motions.
+# An exchange of legs must lower the squared unevenness by at least this fraction of the square of a fast motion.
 MIN_EXCHANGE_GAIN: Final = 0.2
-# The exchange also lowers the squared unevenness by at least this multiple of its median.
+# It must also lower the squared unevenness by at least this multiple of its median.
 MIN_SCATTER_RATIO: Final = 40.0
 
 
@@ -127,7 +128,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     mended = np.where(swapped[:, None], -apart, apart)
     rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
     for first, last in apart_runs(swapped, swapped):
-        # This is no exchange if one of the two points has an outlier here.
+        # If one of the two points has an outlier here, the points were not exchanged.
         if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
             swapped[first : last + 1] = False
     return np.asarray(swapped)

@@ -185,7 +185,7 @@ def body_text(
 
 
 def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> Iterator[str]:
-    """Yield the joints of a link. The base has one for each freedom, and other links have the hinge to their parent."""
+    """Yield the joints of a link: for the base one per degree of freedom, otherwise the hinge to the parent."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):

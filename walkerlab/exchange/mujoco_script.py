@@ -58,7 +58,7 @@ class Walk:
         self.stance = 1
         self.touches_s: list[float] = []
         self.touches_m: list[float] = []
-        # The trailing knee is released once the leading foot stops sinking in, and after the push-off.
+        # The trailing knee stays locked until the leading foot has stopped sinking in and the push-off has ended.
         self.sinks = self.pushes = False
         self.bent = [False, False]
         for knee in self.knees.values():
@@ -73,7 +73,7 @@ class Walk:
         # The time decreases when the walk is reset, for example in the viewer.
         if data.time < self.time_s:
             self.begin()
-        # `mj_forward` calls again at the same time, which is not a new time step.
+        # `mj_forward` calls this again with the same `data.time`, which is not a new time step.
         if data.time > self.time_s:
             self.time_s = data.time
             if data.ncon > 0:

@@ -23,8 +23,8 @@ SMALLEST_BALL_M = 5e-4
 class Link:
     """Rigid link that combines bodies that move together, and the particles on them.
 
-    parent_point_m  hinge in the frame of the parent (m), or the origin of the world for the base
-    point_m         hinge in the frame of the link (m), or the point that the freedoms move for the base
+    parent_point_m  hinge in the frame of the parent (m) or, for the base, the origin of the world
+    point_m         hinge in the frame of the link (m) or, for the base, the point that its degrees of freedom move
     """
 
     name: str
@@ -43,7 +43,7 @@ class Ball:
     link: int
     centre_m: Position
     radius_m: float
-    ground_m: float  # height of the ground (m), which is lower by the radius under the tiny ball of a point foot
+    ground_m: float  # height of the ground (m), lowered under a point foot by the radius of the ball that replaces it
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class PlanarModel:
     """Tree of links, and the components of gravity (m/s^2) along the slope and normal to it, into the ground."""
 
     links: tuple[Link, ...]  # base first, every link after its parent
-    freedoms: tuple[Freedom, ...]  # freedoms of the base relative to the world
+    freedoms: tuple[Freedom, ...]  # degrees of freedom of the base relative to the world
     balls: tuple[Ball, ...]  # feet
     gravity_along: float
     gravity_down: float

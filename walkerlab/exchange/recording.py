@@ -157,10 +157,10 @@ class Recording:
     units: dict[str, str] = field(default_factory=dict)  # unit by column as written in the file, if it states one
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
-    # reason, by column, why it cannot be used, such as a cell with text
+    # for each column that cannot be used, the reason, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
-    unseen: dict[str, str] = field(default_factory=dict)  # reason, by column of a marker, why it has gaps
-    levelled_by: str = ""  # program that turns angles until the floor is level
+    unseen: dict[str, str] = field(default_factory=dict)  # for each marker column with gaps, the reason for them
+    levelled_by: str = ""  # name of the program if it rotates the data to level the floor, otherwise empty
 
     @property
     def time_name(self) -> str | None:
@@ -448,8 +448,8 @@ def seconds_of(cell: str) -> float:
 
 
 def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
-    """Parse the cells of a column. Return the values and ''. If a cell is no number, return incomplete values and the
-    reason.
+    """Parse the cells of a column. Return the values and ''. If a cell is not a number, return incomplete values and
+    the reason.
 
         lines       line number of each cell
         has_points  function that returns whether the file has numbers with a decimal point
@@ -609,7 +609,7 @@ def read_markers(path: Path) -> Recording:
     stated = settings.get("NumMarkers", "")
     if len(markers) > count or (stated and stated != str(count)):
         raise ConfigError(
-            f"{path} names {len(markers)} markers over the coordinates of {count}, and its NumMarkers is {stated}.",
+            f"{path} has names for {len(markers)} markers and coordinates for {count}, and its NumMarkers is {stated}.",
             "Export it again as .trc, with a name for every marker.",
         )
     if not any(map(str.strip, lines[5:])) or not any(markers):

@@ -32,7 +32,7 @@ MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
 MIN_CROSSING_INTERVAL: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
-MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is no heel strike
+MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is not a heel strike
 ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
 MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
@@ -43,7 +43,8 @@ PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first 
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # minimum number of samples in that time
 JUMP_DEGREE: Final = 4
-# A jump counts if it is displaced by this many standard errors. The number is large, because many instants are tried.
+# Jumps count as delayed if their common delay exceeds this many of its standard errors. The number is large, because
+# many instants are tried.
 JUMP_ERRORS: Final = 4.5
 MAX_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
@@ -59,7 +60,7 @@ MAX_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that 
 WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned to about this number
 SAMPLES_ON_A_SIDE: Final = 4  # minimum number of samples for a fit, before and after an instant
 DEGREE: Final = 3
-MIN_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
+MIN_SCATTER: Final = 1e-12  # lower limit of the residual sum of squares, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # trial values (rad) of the sum of leg angles
 MOST_FOUND: Final = 4
 RIDGE: Final = 1e-15  # relative term added to equations, because samples at nearly equal times would make them singular
@@ -123,7 +124,8 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int, float]]:
     """Return the candidate heel strikes, where the front foot comes down to the level of the rear one: the time, the
-    leg, and the sum of the foot's heights up to there. Noise can produce several candidates for one strike.
+    leg, and the foot's heights summed over all samples up to that time. Noise can produce several candidates for one
+    strike.
     """
     # If a recording ends at a heel strike, the crossing may come just after it, so continue it by half an interval.
     before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
@@ -196,7 +198,8 @@ def locate_touch(
     degree = DEGREES[0]
     touch = None
     for iteration in range(ITERATIONS):
-        # Choose the degree again, because the best one shows only when the polynomials meet near the strike.
+        # Choose the degree again in the first iterations, because the best one is not clear until the polynomials meet
+        # near the strike.
         choosing = iteration < DEGREE_ITERATIONS
         fits = yield t, y, at, ALL_DEGREES if choosing else (degree, degree + 1)
         degree = best_degree(fits) if choosing else degree
@@ -215,14 +218,15 @@ def locate_touch(
         if iteration >= DEGREE_ITERATIONS and abs(correction) < MAX_CORRECTION * touch.error_s:
             return touch_of(add_bias(touch.fit, fits.get(degree), fits.get(degree + 1)), height, near + at, leg)
         at += correction
-    # If samples keep changing sides, the zero keeps moving. Its error is then as large as its moves.
+    # If samples keep moving from one side of the strike to the other, the zero keeps moving. So add its last move to
+    # the error.
     if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
         return None
     return replace(touch, error_s=float(np.hypot(touch.error_s, correction)))
 
 
 def fit_together(searches: Sequence[Generator[Problem, Fits, Touch | None]]) -> list[Touch | None]:
-    """Run searches side by side, make the fits that they wait for together, and return the results of the searches."""
+    """Run searches side by side, make the fits that they wait for in one batch, and return the results."""
     results: list[Touch | None] = [None] * len(searches)
     problems = {index: next(search) for index, search in enumerate(searches)}
     while problems:
@@ -237,8 +241,8 @@ def fit_together(searches: Sequence[Generator[Problem, Fits, Touch | None]]) -> 
 
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
-    """Return the samples around an instant: times from it, and angles. If samples are sparse, they cover more of the
-    step.
+    """Return the samples around an instant: their times relative to it, and their angles. Sparse samples cover more of
+    the step.
     """
     row = int(np.searchsorted(time, near))
     away = np.sort(np.abs(time[max(0, row - 2 * MIN_SAMPLES) : row + 2 * MIN_SAMPLES] - near))
@@ -248,7 +252,7 @@ def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple
 
 
 def rows_within(time: Array, instant: float, half: float) -> slice:
-    """Return the samples within half a span of time before and after an instant."""
+    """Return the rows of the samples that are at most `half` (s) before or after an instant."""
     return slice(int(np.searchsorted(time, instant - half)), int(np.searchsorted(time, instant + half, "right")))
 
 
@@ -265,7 +269,7 @@ def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
 
 
 def best_degree(fits: Fits) -> int:
-    """Return the degree with the best criterion."""
+    """Return the degree whose fit has the lowest criterion."""
     return min((degree for degree in DEGREES if degree in fits), key=lambda d: fits[d].criterion, default=DEGREES[0])
 
 
@@ -309,13 +313,13 @@ def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
 def fit_sides(
     times: Sequence[Array], values: Sequence[Array], sides: Sequence[str], degrees: Sequence[int]
 ) -> list[Fits]:
-    """Fit polynomials of each degree to each problem, on these sides of the time 0, where they meet.
+    """Fit polynomials of each degree to each problem. They cover the given sides of the time 0, and meet there.
 
     Columns are in the order of the degrees, so that one factorisation serves all of them.
     """
     sizes = np.array([each.size for each in times])
     filled = np.arange(sizes.max()) < sizes[:, None]
-    # Problems with fewer samples are filled up with rows of zeros.
+    # Pad problems that have fewer samples with rows of zeros.
     t = np.zeros(filled.shape)
     y = np.zeros((*filled.shape, 2))
     t[filled] = np.concatenate(times)
@@ -420,7 +424,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return the squared scatter of the angles that rate jumps explain, over the variance that remains.
+    """Return the sum of squares of the angles that rate jumps explain, divided by the variance of the residuals.
 
     over  (samples,) rad, sum of the angles minus the sum to try
     runs  pairs of first and last samples; a jump is fitted in each, at the last instant at which `over` falls through 0
@@ -481,7 +485,8 @@ def squares_around(
     after = [
         values[:, ::-1] for values in squares_before(mirrored, -instants[:, ::-1], rest[:, ::-1], degrees[1, :, ::-1])
     ]
-    # If both sides must meet, the residuals grow by their squared gap over the sum of the variances of both values.
+    # If both sides must meet, the sum of squared residuals grows by the squared gap between them, divided by the sum of
+    # the variances of their values there.
     gaps = np.sum((before[1] - after[1]) ** 2, axis=2)
     return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
 

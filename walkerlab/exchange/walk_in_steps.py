@@ -59,17 +59,17 @@ MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
 SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
-"""Largest relative difference between the distance over a belt and that from the leg angles that raises no doubt."""
+"""Up to this relative difference, the distance over a belt and the distance from the leg angles raise no doubt."""
 # ratio of clock rates above which a clock that contradicts the swing of the legs raises a doubt
 MAX_CLOCK_RATIO: Final = 1.15
-NOISE_IN_CLOCK: Final = 7.0  # multiple of the relative scatter of the angles by which that limit grows
+NOISE_IN_CLOCK: Final = 7.0  # MAX_CLOCK_RATIO grows by this multiple of the relative scatter of the angles
 TURN_RAD: Final = 1e-3  # rotation of the walker for the difference quotient of its potential energy
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-# largest spacing of recorded values, as a fraction of an error, with which they can show the error
+# recorded values can show an error only if their spacing is at most this fraction of it
 MAX_SPACING: Final = 0.2
-MAX_ERROR_SCATTER: Final = 0.25  # largest scatter over a step, as a fraction, with which an error counts as constant
-MIN_DISTANCE_M: Final = 1e-30  # m; distances that are divisors are at least this large
+MAX_ERROR_SCATTER: Final = 0.25  # an error counts as constant if its scatter over a step is below this fraction of it
+MIN_DISTANCE_M: Final = 1e-30  # m, replaces smaller distances before we divide by them
 # time from the last sample of a step to the heel strike, as a fraction of the duration of the walk
 STRIKE_MARGIN: Final = 1e-10
 
@@ -134,8 +134,8 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
 
 
 def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
-    """Return the vectors (samples,) between two positions of the hip (m): above leg 0 and above leg 1, if the foot
-    centres of both legs were at one point. The real part is normal to the slope, and the imaginary part along it.
+    """Put the foot centres of both legs at one point, and return the vectors (samples,) from the hip above leg 0 to the
+    hip above leg 1 (m). The real part is normal to the slope, and the imaginary part along it.
 
     angles  (samples, 2) of straight legs, from the vertical
     """
@@ -165,7 +165,7 @@ def sum_over_level(model: RigidModel, angles: Array) -> Array:
 
 
 def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Subtract the tilt of the camera: how far the direction that the recording takes as vertical leans forward.
+    """Subtract the tilt of the camera, which is the angle by which the recording's vertical leans forward.
 
     The tilt follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
@@ -260,7 +260,7 @@ def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
-    """Return the longest sequence of heel strikes of alternate legs, and sentences about the others."""
+    """Return the longest sequence of heel strikes of alternate legs, and a list with a doubt if others are dropped."""
     walks: list[list[Touch]] = [[]]
     breaks = []
     for touch in touches:
@@ -295,7 +295,7 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
     if apart > MAX_SPREAD_RAD and not walk.unit_is_stated:
         raise ConfigError(
             f"{source}: the legs are {math.degrees(apart):.0f} degrees apart at time {time:.6g} s.",
-            "State the unit of angles: --units angle=deg, or --units angle=rad if they are that far apart.",
+            "State the unit of angles: --units angle=deg, or --units angle=rad if the legs really are that far apart.",
         )
 
 
@@ -398,8 +398,8 @@ def refuse_noise(angle: Array, source: str) -> None:
     apart = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
     if noise > MAX_SCATTER * apart:
         raise ConfigError(
-            f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, and the legs are {apart:.2g} rad "
-            "apart: heel strikes found there would be noise.",
+            f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, but the legs are only {apart:.2g} "
+            "rad apart, so any heel strikes found would be noise.",
             "Smooth the angles, or record them better.",
         )
 
@@ -459,8 +459,8 @@ def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
 
 
 def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
-    """Return the two neighbouring sample times (s) that are farthest apart between `begin` and `end`. The interval
-    includes one sample before it and one after it.
+    """Return the two neighbouring sample times (s) that are farthest apart between `begin` and `end`. The last sample
+    up to `begin` and the first one from `end` on are included.
     """
     first, last = np.searchsorted(time, begin, "right") - 1, np.searchsorted(time, end)
     instants = time[first : last + 1]
@@ -500,7 +500,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for both ends of a step, the row of the sample, the heel strike, and the rates within the step."""
+    """Return, for each recorded end of a step, the row of its sample, the heel strike, and the rates in the step."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))

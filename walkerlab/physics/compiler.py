@@ -129,12 +129,10 @@ def read_code(path: Path) -> Any:
 
     Returns None if the file is damaged, unreadable or deleted, or if it needs classes that are gone.
     """
-    try:
+    with contextlib.suppress(OSError, ImportError, AttributeError):
         content = path.read_bytes()
         if hashlib.sha256(content[CHECKSUM_BYTES:]).digest() == content[:CHECKSUM_BYTES]:
             return pickle.loads(content[CHECKSUM_BYTES:])
-    except (OSError, ImportError, AttributeError):
-        pass
     return None
 
 

@@ -204,13 +204,12 @@ def cache_folder() -> Path:
     host = processor_name()
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
-    if os.path.lexists(folder):
-        # This may delete the folder, which is then created again.
-        folder = _closed_to_others(folder)
-        folder.mkdir(0o700, exist_ok=True)
-    else:
-        folder.mkdir(0o700, exist_ok=True)
-        # There can be too many folders only after one was created.
+    existed = os.path.lexists(folder)
+    # Closing a folder may delete it, and it is then created again.
+    folder = _closed_to_others(folder) if existed else folder
+    folder.mkdir(0o700, exist_ok=True)
+    # There can be too many folders only after one was created.
+    if not existed:
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     # `_remove_unused` takes the folder's modification time as the time of its last use.
     os.utime(folder)

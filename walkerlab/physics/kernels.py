@@ -232,10 +232,7 @@ def _stack_memory(function: Callable[..., Any], dimensions: int) -> None:
     def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
         like = called.args[0]
         length = like.count if isinstance(like, types.containers.BaseTuple) else like.shape[0]
-
-        def number(value: int) -> Any:
-            return context.get_constant(types.intp, value)
-
+        number = functools.partial(context.get_constant, types.intp)
         memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), length**dimensions))
         array = make_array(called.return_type)(context, builder)
         populate_array(

@@ -69,7 +69,8 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         *HEADLINES["contact-sim"], *WALK_QUANTITIES, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
-"""All numbers that a stage may compute at a point of a sweep, written as in `HEADLINES`. Other stages may have any."""
+"""All quantities that a stage may compute at a point of a sweep, written as in `HEADLINES`. A stage that is not listed
+may compute any."""
 LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
     "last_step_period_s": "step_periods_s",
     "last_step_length_m": "step_lengths_m",
@@ -153,9 +154,13 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the headline quantities of a stage's summary, by name."""
-    last = {name: summary[list_name][-1] for name, list_name in LAST_STEP_SOURCES.items() if summary.get(list_name)}
-    every = dict(flatten(summary, lists=True)) | last
+    every = dict(flatten(summary, lists=True)) | last_step_values(summary)
     return {name: every[name] for name in headlines(stage, every)}
+
+
+def last_step_values(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the headlines in `LAST_STEP_SOURCES` that a summary has."""
+    return {name: summary[list_name][-1] for name, list_name in LAST_STEP_SOURCES.items() if summary.get(list_name)}
 
 
 def change(first: Any, second: Any) -> float | None:

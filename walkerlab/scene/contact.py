@@ -71,11 +71,10 @@ def contact_scene(
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     laws = ground_laws(contact)
-    rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
     drives = contact_drives(config)
-    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, knee_rules(config.walker), drives=drives)
     leg = config.walker.leg_length_m
     frame = contact_state.Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = contact_state.JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -101,7 +100,8 @@ def scene_on_pads(
     Raises NoAnswer if the pitch of the pads needs a contact gait and none is found.
     """
     pitch = None
-    if wants_own_pitch(require_contact(config)):
+    contact = require_contact(config)
+    if contact.terrain == "checkerboard" and contact.pad_pitch == "own":
         search = search or contact_gait(config, rigid_step, rigid_state)
         if search.gait is None:
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
@@ -114,12 +114,11 @@ def scene_on_pads(
 
 
 def contact_drives(config: reads.ContactConfig) -> ContactDrives:
-    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(law, fields)
+    return ContactDrives(hinge_law_of(config.walker), fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -155,8 +154,7 @@ def contact_gait(config: reads.ContactConfig, rigid_step_length_m: float, rigid_
     # This pitch is only the first guess. The search replaces it by the step length of the gait.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
-    legs_differ = have_different_legs(config)
-    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
+    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, have_different_legs(config))
 
 
 def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
@@ -167,17 +165,13 @@ def gait_off_pads(config: "Config", rigid_step_length_m: float, rigid_state: Sta
     return contact_gait(config, rigid_step_length_m, rigid_state)
 
 
-def wants_own_pitch(contact: Contact) -> bool:
-    return contact.terrain == "checkerboard" and contact.pad_pitch == "own"
-
-
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
     """Return the pad pitch (m). Terrain without pads uses the rigid step length as reference length."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
         if own_pitch_m is None:
-            raise ValueError("pad_pitch: own needs the contact gait's step length")
+            raise ValueError("pad_pitch=own requires the step length of the contact gait")
         return own_pitch_m
     return float(contact.pad_pitch)
 
@@ -232,7 +226,8 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
 # Tolerances for maps. They give the same map as the config's tolerances, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
-MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and factor on those of the unchanged start
+# evaluations per cell: a minimum, and a multiple of the number that the unchanged start takes
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4
 
 
 def build_scaled_starts(

@@ -1,4 +1,4 @@
-"""Suggest changes with which a walker has a gait: feet ahead of the shanks, or another slope.
+"""Suggest changes that give a walker a gait: feet ahead of the shanks, or another slope.
 
 For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
 on a few slopes and follows their branches over the slope.

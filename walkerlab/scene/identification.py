@@ -70,7 +70,7 @@ class Fixed(NamedTuple):
     value: float  # 0 for properties of clock and sensors
     scale: float  # typical change
     unit: str
-    slope: Floats  # (values,) derivative of the predicted values with respect to a change by the scale
+    slope: Floats  # (values,) derivative of the predicted values with respect to the parameter divided by `scale`
 
     @property
     def measured(self) -> bool:
@@ -93,14 +93,15 @@ LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over 
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
 PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
-NEAR_CONFIG: Final = 2.0  # loss of log-likelihood, two standard errors, below which estimates agree with the config
+# Estimates agree with the config if its values lower the log-likelihood by less than this (two standard errors).
+NEAR_CONFIG: Final = 2.0
 MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
 RARE_GAIN: Final = 1e-3  # a gain is not due to chance if it is less probable than this under the right model
 REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
 UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
-"""Parameters whose values are not doubted."""
+"""Parameters whose values count as exact."""
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -148,19 +149,18 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None =
         from walkerlab.physics.orbits.contact_map import ContactMap
 
         scene = scene_for(subject.length_m)
-        site = scene(subject.config)
-        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, site, swing)
+        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config), swing)
     step_map.stride = family.stride
     return step_map
 
 
 def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
-    """Return the number of steps from the state of the subject to the start of `step_map_of`."""
+    """Return the number of steps from the subject's state to the state at which the map of `step_map_of` starts."""
     return ((leg or subject.first_leg) - subject.first_leg) % family.stride
 
 
 def gait_start(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> Floats:
-    """Return the gait's section coordinates (d,) at the start of `step_map_of`."""
+    """Return the section coordinates (d,) of the gait where the map of `step_map_of` starts."""
     p: Any = family.start
     return step_map_of(subject, family).step(subject.z, p).z if steps_before(subject, family, leg) else subject.z
 
@@ -181,7 +181,8 @@ def identify_walk(
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
-    results = [identify_with(model, config, measured, gait, question, note, begin) for model in question.models]
+    subjects = (find_model_gait(model, config, gait, note) for model in question.models)
+    results = [identify_with(subject, measured, question, begin) for subject in subjects]
     answers = [result for result in results if isinstance(result, Identification)]
     verdicts = tuple(
         result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", (result,))
@@ -196,26 +197,19 @@ def identify_walk(
 
 
 def rank(answer: Identification) -> tuple[bool, float]:
-    """Return a sort key: results that fit are better than others, then those of higher likelihood."""
+    """Return a sort key: results that fit rank above the others, and among equals the higher likelihood wins."""
     verdict = answer.models[0]
     return verdict.usable, verdict.log_likelihood or -math.inf
 
 
 def identify_with(
-    model: str,
-    config: Config,
-    measured: MeasuredWalk,
-    gait: Mapping[str, Any],
-    question: Identify,
-    note: Callable[[str], None],
-    begin: Begin,
+    subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
     """Fit one model, or return the reason as text if no walk of the model can be fitted.
 
     If it is not known which leg of two that differ swings first, both are tried.
     """
-    subject = find_model_gait(model, config, gait, note)
-    stride = ConfigFamily(config, question.keys).stride
+    stride = ConfigFamily(subject.config, question.keys).stride
     if stride == 1 or measured.first_leg is not None:
         answer = identify_beginning(subject, measured, question, begin)
         stated = FirstLeg(measured.first_leg, "statement", None) if stride > 1 and measured.first_leg else None
@@ -239,13 +233,12 @@ def identify_beginning(
     subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
 ) -> Identification | str:
     """Fit a model to a walk that begins with a step of `measured.first_leg`. Returns the same as `identify_with`."""
-    model = subject.model
     problem = problem_of(subject, measured, question)
-    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
-    kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
+    # Periods alone cannot tell kicks from floor heights, and only the rigid map has derivatives with respect to kicks.
+    kicked = subject.model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
-        fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
+        fit(problem, start, begin(f"{subject.model} model, start {number} of {question.starts}", MAX_ROUNDS))
         for number, start in enumerate(fit_starts(problem, question.starts), 1)
     ]
     predicted = [result for result in fits if result is not None]
@@ -264,11 +257,10 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
     Return None if the data are a table of steps or if the fit fails.
     """
     forecast = first.forecast
-    u = first.u
     if not forecast.measured.sampled:
         return None
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
-    start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
+    start = first.u if nuisances == forecast.nuisances else np.append(first.u, 0.0)
     problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
     fitted = fit(problem, start, begin("angles at their times", MAX_ROUNDS))
     return fitted if fitted is not None and not fitted.reason else None
@@ -278,7 +270,6 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family, measured.first_leg)
     z = gait_start(subject, family, measured.first_leg)
-    directions = effective_directions(walks, z, family.start)
     forecast = Forecast(
         measured=measured,
         nuisances=question.sensors,
@@ -286,13 +277,12 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
         admits=family.admits,
         scales=family.scales(),
         z=z,
-        directions=directions,
+        directions=effective_directions(walks, z, family.start),
     )
     bounds = [question.fit.get(key) or UNBOUNDED for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
     leg_m = subject.config.walker.leg_length_m
-    loss = question.loss
-    return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
+    return FitProblem(forecast, leg_m, family.start, bounds, priors, question.loss, question.max_walks)
 
 
 def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
@@ -339,7 +329,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     if verdict[0] in USABLE:
         others = (other_leg, fixed) if len(left_open) < len(keys) else ()
         suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
-        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
+        strong = (describe_pull(pull) for pull in pulls if pull.standard_deviations > STRONG_PULL)
+        reasons = (*verdict[1], *strong, *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
     elif second_leg and verdict[0] == "misfit" and (describe_limp(steps) or describe_limp(best)):
         verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
@@ -390,11 +381,10 @@ def leg_differences(
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
     """Yield, for each estimate at a bound, how far the data would move it, in standard errors of the free estimate."""
-    problem = fitted.problem
     scales = fitted.forecast.scales
     errors = independent_errors(fitted)
     for key, u, move, error, bounds, scale in zip(
-        keys, fitted.u, fitted.evaluation.move, errors, problem.bounds, scales, strict=False
+        keys, fitted.u, fitted.evaluation.move, errors, fitted.problem.bounds, scales, strict=False
     ):
         for bound in bounds:
             if abs(u * scale - bound) <= AT_BOUND * scale:
@@ -408,7 +398,7 @@ def independent_errors(fitted: Fitted) -> Floats:
 
 
 def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
-    """Yield the distance of each prior from the estimate by the walk alone, in standard errors of the difference."""
+    """Yield each prior's distance from the estimate based on the walk alone, in standard errors of the difference."""
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
@@ -416,10 +406,6 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
-
-
-def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
-    return tuple(pull for pull in pulls if pull.standard_deviations > STRONG_PULL)
 
 
 def describe_pull(pull: Pull) -> str:
@@ -435,9 +421,9 @@ def suggest_parameter(
     """Yield advice on a fixed parameter or nuisance that would explain the walk better if it were estimated, too, or
     that would alone explain it as well as the estimates do.
 
-    A parameter that was measured is doubted as soon as it explains steps better that contradict the config. Otherwise,
-    and for parameters such as gravity or a spring that the config does not have, the gain must be too large to be due
-    to chance.
+    If the estimates from steps disagree with the config, but not widely, a measured parameter is doubted as soon as
+    estimating it explains the steps better. Otherwise, and for parameters such as gravity or a spring that the config
+    does not have, the gain must be too large to be due to chance.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
@@ -476,8 +462,8 @@ def describe_change(other: Fixed, change: float) -> str:
 
 
 def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
-    """Return the loss of log-likelihood, to second order, if all estimates but the most helpful one had the config's
-    values.
+    """Return the smallest loss of log-likelihood, to second order, if all estimated parameters but one keep the
+    config's values and that one is fitted again.
     """
     count = len(keys)
     moved = fitted.u[:count] - np.array(fitted.problem.start) / fitted.forecast.scales
@@ -491,10 +477,10 @@ def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
 def changes_alone(
     subject: ModelUnderTest, keys: Sequence[str], others: Iterable[Fixed], fitted: Fitted
 ) -> Iterator[tuple[Any, Fixed, float]]:
-    """Yield fixed parameters of which a change alone explains a walk that contradicts the config.
+    """Yield each fixed parameter that explains a walk that contradicts the config, if it is the only one to change.
 
-    Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters, at
-    least two, keep the config's values.
+    Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters
+    keep the config's values. If there are fewer than two of them, nothing is yielded.
     """
     if (
         len(keys) < 2
@@ -503,7 +489,7 @@ def changes_alone(
         or distance_from_config(keys, fitted) < FAR_FROM_CONFIG
     ):
         return
-    # A likelihood-ratio test must not reject this single change in favour of the estimates, which are more parameters.
+    # A likelihood-ratio test must not prefer the estimates, which change more parameters, to this single change.
     enough = fitted.evaluation.likelihood - 0.5 * chdtri(len(keys) - 1, REJECTED)
     for other in others:
         problem = problem_for(subject, (other.name,), [UNBOUNDED], fitted.problem)
@@ -535,9 +521,8 @@ def gain_of_freeing(
     free = fit(wider, np.insert(fitted.u, count, other.value / other.scale))
     if free is None or free.reason:
         return 0.0, 0.0
-    return float(free.evaluation.likelihood - fitted.evaluation.likelihood), float(
-        free.u[count]
-    ) - other.value / other.scale
+    gain = float(free.evaluation.likelihood - fitted.evaluation.likelihood)
+    return gain, float(free.u[count]) - other.value / other.scale
 
 
 def problem_for(
@@ -571,7 +556,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg. Other zeros stay."""
+    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg, for any other zero 0."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -598,12 +583,14 @@ def keys_read_by(model: str, config: Config) -> tuple[str, ...]:
 def fixed_parameters(
     subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
 ) -> Iterator[Fixed]:
-    """Yield each fixed parameter and each other nuisance, if walks can be predicted at changed values."""
-    config = subject.config
+    """Yield every fixed parameter, and for angles every nuisance that is not estimated.
+
+    Parameters for which no walk can be predicted at changed values are left out.
+    """
     forecast = fitted.forecast
     count = len(question.keys)
     sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
-    family = ConfigFamily(config, (*question.keys, *fixed))
+    family = ConfigFamily(subject.config, (*question.keys, *fixed))
     wide = replace(
         forecast,
         walks=step_map_of(subject, family, forecast.measured.first_leg),
@@ -615,11 +602,11 @@ def fixed_parameters(
     u = np.concatenate((fitted.u[:count], values / wide.scales[count:], fitted.u[count:], np.zeros(len(sensors))))
     indices = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
     scales = [*wide.scales[count:].tolist(), *(NUISANCES[name][1] for name in sensors)]
-    units = [*(parameter_of(key, config).unit for key in fixed), *map(unit_by_name, sensors)]
+    units = [*(parameter_of(key, subject.config).unit for key in fixed), *map(unit_by_name, sensors)]
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
-        # If a walk on one side ends early, only the exact differences can be one-sided.
+        # If the walk at the larger value ends early, the exact difference can still use the other side.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:
@@ -707,14 +694,14 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
             return None
         z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
         stride = forecast.walks.stride
-        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)  # type: ignore[arg-type]
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)
         if not isinstance(gait, Cycle):
             return None
         radius = float(np.abs(gait.multipliers).max()) ** (1.0 / stride)
         values = (gait.period_s / stride, math.fsum(gait.lengths_m) / stride, radius)
         if units is None:
             return np.array(values)
-        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))  # type: ignore[arg-type]
+        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))
         return None if norms is None else np.array((*values, norms[0]))
 
     centre = quantities(0.0 * fitted.u)

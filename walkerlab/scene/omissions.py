@@ -60,9 +60,8 @@ def contact_walk_omissions(config: "ContactSimConfig") -> tuple[Entry, ...]:
     if contact is not None and contact.stance == "pinned":
         angles = count_step_angles(config.walker)
         what = "floating base and stance contact in the first step"
-        reason = "contact.stance is pinned"
         saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
-        omissions.append(omission(what, f"{reason}: {angles} angles suffice", saved))
+        omissions.append(omission(what, f"contact.stance is pinned: {angles} angles suffice", saved))
     if config.walker.foot_radius_m == 0.0:
         saved = "nothing: zeros cost the same time"
         omissions.append(omission("terms of the foot radius", "walker.foot_radius_m is 0", saved))

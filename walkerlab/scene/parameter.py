@@ -28,10 +28,6 @@ class Parameter:
     unit: str  # unit of its values
     path: tuple[str, ...]
 
-    @property
-    def varies_second_leg(self) -> bool:
-        return SECOND_LEG in self.path
-
     def value_in(self, config: reads.ContactConfig) -> float:
         value = stated_value(config, self.path)
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
@@ -106,10 +102,8 @@ def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
 
 def mass_of_second_leg(config: reads.ContactConfig) -> str | None:
     """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
-    paths = (
-        path for path, _ in fields.leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg")
-    )
-    return next(map(".".join, paths), None)
+    paths = (path for path, _ in fields.leaves(Config, held=config) if SECOND_LEG in path)
+    return next((".".join(path) for path in paths if path[-1].endswith("mass_kg")), None)
 
 
 def _keys_set(value: Any) -> Any:

@@ -209,7 +209,7 @@ def law_class(kind: LawKind, word: str) -> Any:
     """
     try:
         law = kind.laws.get(word) or load(code_by_word(kind.key)[word])
-    # The code is another package's, which may raise anything.
+    # `load` runs another package's code, which may raise anything.
     except Exception as error:
         raise ConfigError(
             f"{kind.key}: the code of '{word}' cannot be imported: {type(error).__name__}: {error}.",

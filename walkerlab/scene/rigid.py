@@ -113,7 +113,8 @@ def state_names(config: reads.RigidConfig) -> tuple[str, ...]:
 
 
 def first_step_length(config: reads.RigidConfig, start: system.State) -> float:
-    """Return the length (m) of the rigid model's first step from a state, or half a leg if it does not complete it.
+    """Return the length (m) of the rigid model's first step from a state, or half the leg length if the step is not
+    completed.
 
     It is the reference length of a walk that starts in mid-step, because the feet are not a step apart then.
     """

@@ -1,4 +1,4 @@
-"""Find the study that a config's walker belongs to, and its equations of motion in addition to Lagrange's."""
+"""Find the study that a config's walker belongs to, and the equations of motion that it adds to Lagrange's."""
 
 from __future__ import annotations
 

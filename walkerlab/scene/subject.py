@@ -17,7 +17,7 @@ from walkerlab.physics.orbits.rigid_map import RigidMap, coordinates_of
 from walkerlab.physics.orbits.robustness import GaitOnMap
 from walkerlab.physics.orbits.step_map import StepMap, walk_steps
 from walkerlab.physics.solvers import registry, system
-from walkerlab.scene.parameter import SLOPE, Parameter, parameter_of
+from walkerlab.scene.parameter import SECOND_LEG, SLOPE, Parameter, parameter_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
 
 def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
     """Return the number of steps that a family's step map takes: 2 if the legs differ, or may differ, otherwise 1."""
-    return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
+    return 2 if SECOND_LEG in parameter.path or have_different_legs(config) else 1
 
 
 def scene_for(step_length_m: float) -> "Callable[[ContactConfig], ContactScene]":
@@ -126,10 +126,8 @@ class ModelUnderTest:
         once.
         """
         quick = QUICK_WALKS[self.model]
-        return [
-            gait._replace(step_map=gait.step_map.replace_tolerances(quick))
-            for gait in self.gait_on_map().split_by_leg()
-        ]
+        gaits = self.gait_on_map().split_by_leg()
+        return [gait._replace(step_map=gait.step_map.replace_tolerances(quick)) for gait in gaits]
 
     @property
     def first_leg(self) -> int:

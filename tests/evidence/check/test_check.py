@@ -285,7 +285,7 @@ ODD = {
     "decimal comma": ("extends: paper\ncheck: {printed: {period_s: '0,70'}}\n", "decimals follow a point"),
     "unit": ("extends: paper\ncheck: {printed: {period_s: 0.70 s}}\n", "without its unit"),
     "odd state": ("extends: paper\ncheck: {printed: {state: [1, 2, 3]}}\n", "state has 3 values"),
-    "one value": ("extends: paper\ncheck: {printed: {state: 1}}\n", "state is one value"),
+    "one value": ("extends: paper\ncheck: {printed: {state: 1}}\n", "state is one value, not a list"),
     "shank of a compass": (
         "extends: paper\ncheck: {angles: {order: [swing, shank]}, printed: {state: [1, 2, 3, 4]}}\n", "this walker has"
     ),

@@ -104,7 +104,7 @@ def test_fixed_point_with_both_misprints_agrees_with_an_independent_program():
     assert_allclose(step(walker, state, MISPRINTED), state, atol=1e-6)
 
 
-def test_inertia_of_the_impact_gives_the_kinetic_energy_if_angles_come_first(study):
+def test_impact_inertia_matrix_gives_the_kinetic_energy_only_with_the_angles_first(study):
     walker, rates = walker_of_the_paper(CORRECTED), np.array([-0.6, -0.84, 0.3, -0.2])
     q, h = np.array([-0.2022, 0.1674]), 1e-6
     ahead = numpy_walker.positions(q + h * rates[:2], h * rates[2:])[:3]

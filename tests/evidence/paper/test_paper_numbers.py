@@ -61,7 +61,7 @@ def printed(text):
     ("text", "value", "last_digit"),
     [("-0.60", -0.6, 0.01), ("+0.15%", 0.15, 0.01), ("10^5", 1e5, 1e5), ("10^-4", 1e-4, 1e-4), ("five", 5, 1)],
 )
-def test_printed_number_has_a_value_and_a_last_digit(text, value, last_digit):
+def test_value_and_last_digit_of_a_printed_number_are_parsed(text, value, last_digit):
     assert printed(text).value == pytest.approx(value, rel=1e-15)
     assert printed(text).digits.unit == pytest.approx(last_digit)
 

@@ -50,7 +50,7 @@ def whole(tmp_path_factory):
     return run(tmp_path_factory.mktemp("whole"))
 
 
-def test_map_cell_of_the_papers_ground_leads_to_walking():
+def test_walker_walks_in_the_map_cell_of_the_papers_ground():
     outcome, steps, sharper, error, _ = stiction_cell(PAPER_STIFFNESS, 0.1)
     assert (outcome, steps, sharper) == (Outcome.WALKED, 4, Outcome.WALKED)
     assert 0.0 < error < 1e-6

@@ -49,7 +49,7 @@ def test_friction_peaks_at_the_stiction_velocity_and_falls_to_the_dynamic_value(
     assert np.all(np.diff(falling) <= 1e-15)
 
 
-def test_friction_half_way_between_the_velocities_is_the_mean():
+def test_friction_halfway_between_stiction_and_friction_velocity_is_the_mean_coefficient():
     assert coefficient(PAPER, 0.55) == pytest.approx(-0.8)
     assert coefficient(PAPER, 0.05) == pytest.approx(-0.9 * (3 * 0.5 - 0.5**3) / 2)
 

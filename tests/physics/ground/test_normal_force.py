@@ -38,7 +38,7 @@ def test_step_function_is_flat_outside_and_smooth_at_its_ends(x0, width, h0, h1)
     assert slope == pytest.approx(1.5 * (h1 - h0) / width, abs=1e-9 * (1.0 + rise) / width)
 
 
-def test_step_function_is_the_cubic_with_those_ends():
+def test_step_function_is_the_cubic_with_the_given_end_values_and_flat_ends():
     """Two values and two flat ends are four conditions, which only one cubic meets."""
     x0, h0, x1, h1 = 0.3, -1.0, 1.1, 4.0
     conditions = [[x**3, x**2, x, 1.0] for x in (x0, x1)] + [[3 * x**2, 2 * x, 1.0, 0.0] for x in (x0, x1)]

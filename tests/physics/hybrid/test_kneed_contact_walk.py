@@ -220,7 +220,7 @@ def test_stiff_knee_stop_walks_like_the_ideal_lock():
     assert apart[1] < 0.3 * apart[0]
 
 
-def test_knee_stop_converges_to_the_ideal_lock_with_the_root_of_stiffness():
+def test_error_of_a_knee_stop_falls_with_the_square_root_of_its_stiffness():
     """The damping ratio is constant, and damping is full far below the compression. Compare the times of locks and of
     step ends.
     """
@@ -249,7 +249,7 @@ def test_long_kneed_walk_settles_on_the_contact_gait():
     assert abs(gait.multipliers[0]) == pytest.approx(abs(0.35257 + 0.55221j), abs=0.1)
 
 
-def test_step_derivative_through_lock_and_release_equals_its_slope():
+def test_step_derivative_through_lock_and_release_equals_finite_differences():
     scene, stance = scene_of(), 1
     methods = settings(1e-11)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
@@ -266,7 +266,7 @@ def test_step_derivative_through_lock_and_release_equals_its_slope():
         np.testing.assert_allclose(at.DP[:, column], slope, atol=2e-4 * np.abs(at.DP).max())
 
 
-def test_start_of_a_round_foot_rolls_on_the_ground():
+def test_walk_starts_with_a_round_stance_foot_rolling_on_the_ground():
     scene = scene_of(radius=0.2)
     y = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     stance = feet_motion(scene.walker.whole, y)[1]

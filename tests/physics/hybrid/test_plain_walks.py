@@ -45,7 +45,7 @@ def test_walks_over_random_heights_agree_with_an_independent_integration(campaig
 
 
 @pytest.mark.parametrize("seed", [6, 25])
-def test_walks_whose_feet_pass_in_uneven_ground_agree_with_an_independent_integration(campaign, seed):
+def test_walks_whose_feet_pass_below_uneven_ground_agree_with_an_independent_integration(campaign, seed):
     """In the first, a foot must not count as stubbed. In the second, a loaded foot must not lose the ground."""
     assert campaign.compare(campaign.passing(seed), steps=1).wrong == []
 

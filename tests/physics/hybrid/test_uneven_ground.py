@@ -136,7 +136,7 @@ def test_feet_land_at_the_heights_of_their_footholds():
     np.testing.assert_array_equal(walk.foothold_height_m, heights[1:])
 
 
-def test_foothold_heights_of_zero_change_no_bit_of_a_rigid_walk():
+def test_foothold_heights_of_zero_leave_a_rigid_walk_bitwise_unchanged():
     _, walker, gait = gait_of("kneed")
     even, level = (take_walk(walker, TIGHT, gait.state, 3, heights=heights) for heights in (None, np.zeros(4)))
     np.testing.assert_array_equal(even.after, level.after)
@@ -218,7 +218,7 @@ def test_hitting_the_side_of_a_raised_pad_counts_as_off_pad():
     assert walk.steps == 1
 
 
-def test_foot_is_supported_after_mid_swing_once_it_was_above_its_foothold():
+def test_walker_falls_if_its_foot_cannot_reach_or_never_clears_a_foothold():
     """The walker falls if a foothold is too deep to be reached in time, and if it is so high that the foot is never
     above it.
     """
@@ -306,7 +306,7 @@ def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
 
 
 @pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
-def test_foot_in_the_ground_at_a_second_passing_is_supported_as_on_even_ground(terrain):
+def test_foot_that_passes_again_below_the_ground_is_supported_as_on_even_ground(terrain):
     """All footholds are level but one, which is never reached."""
     sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
     heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])

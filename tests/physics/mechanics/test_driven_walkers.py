@@ -22,6 +22,7 @@ from test_random_walkers import (
 )
 
 from walkerlab.physics.mechanics import impact
+from walkerlab.physics.mechanics.hinges import HIP_ROW
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, BENT, STANCE, STRAIGHT, SWING, Mode
 from walkerlab.physics.orbits.similarity import unit_walker
@@ -66,12 +67,12 @@ def test_energy_change_of_a_swing_equals_the_work_of_torque_and_damper(assembly,
     y, n = state_of(model, BENT, free), len(model.arm_x)
 
     def with_work(_, x):
-        rate, (_, damping, torque) = apart(model, x)[1], model.hip
+        rate, (_, damping, torque) = apart(model, x)[1], model.laws[HIP_ROW]
         return (*x[n : 2 * n], *rates(model, BENT, tuple(x[:-1])), (torque - damping * rate) * rate)
 
     swing = solve_ivp(with_work, (0.0, 0.1), (*y, 0.0), "DOP853", rtol=1e-11, atol=1e-12)
-    spring = [0.5 * model.hip[0] * apart(model, x)[0] ** 2 for x in swing.y.T]
-    without = model.changed(hip=(0.0, *model.hip[1:]))
+    spring = [0.5 * model.laws[HIP_ROW][0] * apart(model, x)[0] ** 2 for x in swing.y.T]
+    without = model.changed(hip=(0.0, *model.laws[HIP_ROW][1:]))
     balance = [total_energy(without, tuple(x[:-1])) + e - x[-1] for x, e in zip(swing.y.T, spring, strict=True)]
     assert np.ptp(balance) < 1e-7 * (1.0 + np.abs(balance).max())
     assert total_energy(model, y) == pytest.approx(total_energy(without, y) + spring[0], abs=1e-9)

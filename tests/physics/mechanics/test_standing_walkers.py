@@ -269,7 +269,7 @@ def test_locked_leg_moves_like_a_leg_of_one_piece(numbers):
 
 @pytest.mark.parametrize("strike", [heel_strike, knee_strike])
 @given(numbers=free)
-def test_strike_derivative_equals_its_slope(strike, numbers):
+def test_derivatives_of_heel_and_knee_strikes_equal_finite_differences(strike, numbers):
     y = np.array(kneed_state(numbers))
     found = np.array(strike(KNEED, y, np.eye(8))[8:]).reshape(8, 8).T
     slopes = differences(lambda x: strike(KNEED, x), y)

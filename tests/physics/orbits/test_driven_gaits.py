@@ -87,7 +87,7 @@ DRIVEN = {
 
 
 @pytest.mark.parametrize("name", DRIVEN)
-def test_derivative_of_a_driven_step_map_equals_its_slope(name):
+def test_derivative_of_a_driven_step_map_equals_finite_differences(name):
     walker, _ = unit_walker(change_slope(walker_of(name, **DRIVEN[name]), 0.0))
     gait = find_gaits(walker).gait
     shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)

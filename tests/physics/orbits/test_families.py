@@ -482,7 +482,7 @@ class Circle:
 
 def test_continuation_traces_a_circle_and_finds_its_folds():
     control = StepControl(first=0.1, longest=0.3, turn=0.9)
-    point = correct(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
+    point = correct(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), Effort(1e-14))
     folds, gone, length = [], 0.0, control.first
     while gone < 2.0 * np.pi:
         following, length = step_along(Circle(), point, length, control)

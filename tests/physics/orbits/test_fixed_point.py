@@ -411,7 +411,7 @@ def led(map_, walker, starts, gaits=()):
 
 
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
-def test_prediction_for_a_start_follows_newton_iterations(walker):
+def test_newton_from_a_start_reaches_the_gait_predicted_for_it(walker):
     map_ = shooting(walker)
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
     near = gait * [[1.02, 0.96, 1.03]]

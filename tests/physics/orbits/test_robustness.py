@@ -168,7 +168,7 @@ def test_compass_takes_the_known_number_of_steps_on_rough_ground():
     assert abs(seen.mean_steps - 18.4) < 4.0 * math.hypot(seen.standard_error, 0.7)
 
 
-def test_too_short_landing_ends_a_walk_on_rough_ground():
+def test_foot_that_lands_too_close_ends_a_walk_on_rough_ground():
     """For the level compass and 1 mm, a library's integrator shows that the foot lands too close after the sixth step
     of the fourth walk.
     """

@@ -131,7 +131,7 @@ def test_every_crossing_is_found_in_order(thousandths, sign, direction):
 
 
 @pytest.mark.parametrize("left", [0.0, 1e-13, -1e-13])
-def test_direction_from_zero_follows_the_slope_despite_an_event_residual(left):
+def test_event_function_leaves_its_zero_in_the_right_direction_despite_a_small_offset(left):
     falls_then_rises = left + Polynomial([0.0, -1e-6, 1e-2])
     assert way_from_zero(finder_on(falls_then_rises), 0, 1e-12) == pytest.approx(-1e-6, rel=1e-5)
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0

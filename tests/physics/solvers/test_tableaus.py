@@ -60,7 +60,7 @@ def test_stage_times_equal_the_row_sums(name):
 
 
 @every_tableau
-def test_every_condition_of_the_order_is_met(name):
+def test_every_order_condition_is_met(name):
     """Coefficients have 16 digits, and their products can be as large as some tens."""
     A, b, _ = TABLEAUS[name]()
     for order in range(1, METHODS[name].orders[1] + 1):

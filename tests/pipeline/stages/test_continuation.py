@@ -139,7 +139,7 @@ def test_branch_that_ends_because_the_foot_slides_says_what_to_change():
 
 
 @pytest.mark.parametrize(("tripped", "side"), [((0.0, 1.0), "Above"), ((1.0, 0.0), "Below")])
-def test_pads_that_end_a_gait_are_distinguished_from_its_limits(tripped, side):
+def test_report_says_that_pads_end_the_walks_there_but_not_the_gait(tripped, side):
     monitor = SimpleNamespace(name="tripped", limit=0.5)
     points = [SimpleNamespace(value=value, monitors=[one]) for value, one in zip((4.0, 4.2), tripped, strict=True)]
     crossing = SimpleNamespace(monitor=monitor, value=4.1)
@@ -192,7 +192,7 @@ def test_stored_doubled_branch_begins_at_the_flip_of_its_parent(in_degrees):
     assert np.ptp(group["mark_step_period"][0]) == 0.0
 
 
-def test_doubled_branch_lists_the_flip_in_its_own_step_order():
+def test_doubled_branch_shows_the_gait_at_its_flip_starting_from_its_own_first_step():
     gait = SimpleNamespace(periods_s=np.array([0.5, 0.6, 0.7]), angles=np.array([0.1, 0.2, 0.3]))
     flip = SimpleNamespace(kind="flip", value=6.0, gait=gait)
     parent = SimpleNamespace(period=3, bifurcations=(flip,))

@@ -324,7 +324,7 @@ def test_table_of_periods_alone_is_read(tmp_path):
     assert measured.lengths_m is None
 
 
-def test_steps_of_the_documentation_hardly_show_that_the_leg_is_wrong(gait):
+def test_steps_in_the_docs_example_hardly_reveal_a_wrong_leg_length(gait):
     """docs/identify-mistakes.md states the difference of the log-likelihood, 0.5."""
     table = Path(__file__).parents[3] / "docs" / "downloads" / "stopwatch.csv"
     asked = ask(table, "identify.fit={slope_deg: null, walker.hip_mass_kg: null}")

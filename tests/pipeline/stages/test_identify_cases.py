@@ -67,7 +67,7 @@ def test_no_walker_fits_a_person_or_the_tables_of_the_paper(name, level, fit):
     )
 
 
-def test_steps_of_the_person_take_six_tenths_of_a_second():
+def test_steps_of_the_treadmill_recording_take_six_tenths_of_a_second():
     walk = walkerlab.read_walk(DOCS / "downloads" / "treadmill.csv")
     assert walk.summary["steps"] == 3
     assert walk.summary["step_periods_s"] == pytest.approx([0.597] * 3, abs=0.02)

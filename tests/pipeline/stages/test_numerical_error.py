@@ -68,7 +68,7 @@ def test_second_walk_falls_back_to_a_smaller_factor_or_another_method():
     assert tightened(Tolerances("radau5", MIN_RTOL, 1e-12, 1))[0].method == "dop853"
 
 
-def test_unusual_second_walk_is_reported():
+def test_second_walk_with_a_smaller_than_usual_tightening_is_reported():
     error = walk("simulate", "solver.rigid.rtol=1e-13", "solver.rigid.atol=1e-15", "outputs=[]")["numerical_error"]
     assert error["by"] == "ten times tighter tolerances"
     assert error["step_period_s"] < 1e-12

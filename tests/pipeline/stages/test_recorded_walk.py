@@ -128,7 +128,7 @@ def test_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
     read = walkerlab.read_walk(folder.artifact("simulate"))
     assert read.summary["steps"] == 4
     assert "mechanical_J" in read.content["trajectory"].variables
-    with pytest.raises(ConfigError, match=r"contains no walk over time"):
+    with pytest.raises(ConfigError, match=r"contains no samples of a walk"):
         walkerlab.read_walk(folder.artifact("fixedpoint"))
 
 
@@ -207,7 +207,7 @@ def test_missing_rows_are_an_error_with_their_position(tmp_path, begin, end, why
     assert "8 samples per step" in refusal.value.advice
 
 
-def test_few_missing_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
+def test_gap_of_a_few_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
     head, *rows = table(simulated("rigid")).splitlines()
     kept = [row for row in rows if not 1.0 < float(row.split(",")[0]) < 1.05 and float(row.split(",")[0]) < 4.0]
     time, angles = kept[-1].split(",", 1)

@@ -128,7 +128,7 @@ def test_scaled_norm_does_not_favour_longer_legs():
     assert "push_off.impulse_N_s" in shown["Parameters that are zero"]
 
 
-def test_push_reports_whether_the_ground_still_pushes(rigid, both):
+def test_largest_push_reports_whether_the_ground_would_have_to_pull(rigid, both):
     """Compute the force of the ground from the weight and the acceleration of all masses during the walk after the
     push.
     """
@@ -222,7 +222,7 @@ def test_invalid_questions_are_rejected(changes, said):
         run("slope-3deg", *changes)
 
 
-def test_parameter_of_one_model_is_answered_for_that_model():
+def test_sensitivity_to_a_contact_parameter_is_computed_for_the_contact_model_only():
     found = run("slope-3deg", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
     assert {row["model"] for row in found.summary["sensitivity"]} == {"contact"}
 

@@ -72,7 +72,7 @@ def test_artifact_survives_a_round_trip(content, tmp_path_factory):
     assert (read.identity, read.provenance, read.complete, read.seal) == (identity, origin, True, written.seal)
 
 
-def test_every_part_of_a_content_survives_a_round_trip(tmp_path, content, identity, origin):
+def test_every_part_of_an_artifacts_content_survives_a_round_trip(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", replace(content, complete=False), identity, origin)
     read = artifact.read(tmp_path / "a.h5")
     walk, original = read["corrected/walk"], content["corrected/walk"]
@@ -104,7 +104,7 @@ def test_xarray_opens_each_group(tmp_path, content, identity, origin):
         assert root.attrs["stage_key"] == identity.key
 
 
-def test_arrays_at_the_root_are_one_dataset_with_text_in_any_shape(tmp_path, identity, origin):
+def test_root_arrays_open_as_one_dataset_and_keep_text_of_any_shape(tmp_path, identity, origin):
     words = np.array([["a", "b", "a"], ["c", "", "é"]], dtype=object)
     group = Group(
         {

@@ -19,7 +19,7 @@ def drawn(folder):
     return Content({artifact.FILES_GROUP: artifact.index_files(folder.path, [folder.figures / "figure-02.svg"])})
 
 
-def test_unchanged_drawing_has_no_broken_file(folder):
+def test_unchanged_drawn_files_are_not_reported_as_broken(folder):
     assert artifact.broken_file(folder.path, drawn(folder)) is None
     assert artifact.broken_file(folder.path, Content()) is None
 
@@ -47,7 +47,7 @@ def test_clean_removes_only_generated_files(folder, identity, origin):
     assert left == ["figures", "notes.txt", "own.svg"]
 
 
-def test_clean_does_not_leave_the_run_folder(folder, identity, origin, tmp_path):
+def test_clean_ignores_listed_files_outside_the_run_folder(folder, identity, origin, tmp_path):
     (tmp_path / "precious").write_text("not of this run")
     forged = artifact.index_files(tmp_path, [tmp_path / "precious"])
     forged["file"].setflags(write=True)

@@ -182,7 +182,7 @@ def test_point_has_the_key_of_its_single_run(name, tmp_path):
     assert {stage.name: Keys().compute_keys(loaded.config, stage.name)[stage.name] for stage in stages} == single
 
 
-def test_engine_version_changes_only_the_key_of_the_stage_engines(monkeypatch):
+def test_engine_version_changes_only_the_key_of_the_engines_stage(monkeypatch):
     config = load().config
     monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent"),))
     keys = []

@@ -199,7 +199,7 @@ def test_dask_starts_a_local_cluster(toy):
 
 
 @pytest.mark.filterwarnings("ignore")  # warnings from inside the library
-def test_jobs_on_this_machine_give_the_same_result(toy, tmp_path, monkeypatch):
+def test_slurm_jobs_on_this_machine_mark_the_point_that_kills_its_worker(toy, tmp_path, monkeypatch):
     submitit = pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     # how long submitit waits for the result of a dead job on a slow network disk, and how often it checks for results
     monkeypatch.setattr(submitit.Job, "_results_timeout_s", 0)

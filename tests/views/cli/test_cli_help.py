@@ -177,7 +177,7 @@ def test_shell_completes_keys_configs_and_options(walker, typed, offered):
 
 
 @pytest.mark.parametrize("typed", ["--slope_deg", "--slope-deg", "--hip_mass_kg"])
-def test_config_key_typed_as_option_explains_set(typed):
+def test_config_key_typed_as_an_option_suggests_the_set_option(typed):
     done = CliRunner().invoke(program(), ["fixedpoint", typed, "3"])
     assert done.exit_code == 2
     assert f"{typed.lstrip('-').replace('-', '_')}=VALUE" in done.output
@@ -203,7 +203,7 @@ def test_flag_may_contain_a_hyphen():
     assert "--from-step" in done.output
 
 
-def test_redirecting_option_names_a_stage_with_the_same_options():
+def test_option_that_runs_another_stage_needs_only_options_that_this_stage_has():
     redirects = [(stage, option) for stage in PIPELINE.stages for option in stage.options if option.runs]
     assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
     for stage, option in redirects:

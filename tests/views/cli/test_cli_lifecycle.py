@@ -228,7 +228,7 @@ def test_termination_exits_like_an_interrupt_and_names_the_run(toy, tmp_path):
     assert value["error"]["exit_code"] == 130
 
 
-def test_closed_pipe_ends_quietly(walker):
+def test_command_ends_quietly_if_its_output_pipe_is_closed(walker):
     with walker.start("schema") as process:
         process.stdout.close()
         assert process.wait(timeout=30) in (0, 141)
@@ -304,7 +304,7 @@ def test_characters_missing_from_the_terminal_are_escaped(walker):
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
 
 
-def test_closed_stdout_ends_quietly(walker):
+def test_command_with_closed_stdout_ends_quietly(walker):
     command = f"exec {shlex.join(walker.command)} schema >&-"
     done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")

@@ -89,7 +89,7 @@ def test_step_columns_may_have_a_unit_suffix(tmp_path):
     path.write_text("duration (ms),step [mm]\n703.6,371.4\n704.0,371.6\n")
     columns = {"period_s": "duration", "length_m": "step [mm]"}
     assert read_steps(path, Identify(columns=columns), 0.0).lengths_m == pytest.approx([0.3714, 0.3716])
-    with pytest.raises(ConfigError, match="is in mm, but --units that it is in m"):
+    with pytest.raises(ConfigError, match="is in mm, but --units says m"):
         read_steps(path, Identify(columns=columns, units={"length": "m"}), 0.0)
     with pytest.raises(ConfigError, match="'lenght' is neither a kind, a quantity nor a column"):
         read_steps(path, Identify(columns=columns, units={"lenght": "mm"}), 0.0)

@@ -111,7 +111,7 @@ def test_results_of_unknown_origin_are_not_overwritten(toy):
     assert run_dir(toy("roll", "-c", "runs/stone", "--json")) == "runs/stone"
 
 
-def test_edited_config_file_reruns_in_its_folder(toy):
+def test_rerun_of_an_edited_config_file_keeps_its_run_folder(toy):
     file = config(toy, "stone.yaml", 2)
     for gravity in (2, 8, 2):
         config(toy, "stone.yaml", gravity)

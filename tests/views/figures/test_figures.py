@@ -213,7 +213,7 @@ def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
                 ]
 
 
-def test_lines_in_time_are_the_stored_angles_and_velocities():
+def test_curves_over_time_show_the_stored_angles_and_velocities():
     results = both_models()
     axes = plotted(NUMBERED[7], results).axes
     for row, (name, leg) in enumerate((("angle", 0), ("angle", 1), ("velocity", 0), ("velocity", 1))):

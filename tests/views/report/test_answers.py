@@ -83,7 +83,7 @@ def test_corrected_column_is_labelled_only_next_to_the_printed_one():
     assert ["quantity", "as", "printed"] in cells(answer("fixedpoint", printed))
 
 
-def test_gait_is_a_sentence_and_a_table_of_both_sets_of_equations():
+def test_gait_is_reported_in_a_sentence_and_a_table_of_both_sets_of_equations():
     printed = {**GAIT, "equations": "as-printed", "state": [-0.2022, 0.1674, -0.6006, -0.8466]}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert lines[0].startswith("On a slope of 0.0174 rad (0.997°) there is a stable gait")
@@ -234,7 +234,7 @@ def test_long_rows_keep_their_ends():
     assert "(1000 values" in line
 
 
-def test_columns_align_under_letters_with_dots():
+def test_columns_stay_aligned_if_letters_carry_dots_above():
     first, second = aligned([["θ̇₁", "1"], ["ab", "2"]])
     assert width(first) == width(second) == 5
 

@@ -98,7 +98,7 @@ def test_error_below_the_uncertainty_of_the_reference_is_shown_as_a_bound(made):
     assert costs["contact", "radau5"][2] == "≤ 10⁻¹²"
 
 
-def test_run_with_another_outcome_is_shown_with_it(made):
+def test_run_with_a_different_outcome_is_listed_with_that_outcome(made):
     costs = tables(made)["Shortest run time for each error, by method"]
     assert costs["rigid", "scipy-bdf"][-1] == "slid at 10⁻³"
 

@@ -46,7 +46,7 @@ def test_texts_in_number_columns_are_braced():
     assert r"\begin{tabular}{l}" in tex_of("walked", "fell")
 
 
-def test_tables_of_the_paper_have_its_digits_words_and_a_caption():
+def test_latex_tables_of_the_paper_keep_the_printed_digits_and_have_a_caption():
     row = {"unit": "s", "paper_matlab": 0.6, "paper_matlab_text": "0.60", "corrected": 0.7036, "contact": 0.7111}
     text = as_tex(table_of("table3", {"t_left": row})).decode()
     assert r"\caption{Table 3: characteristics of the walk, in the paper and here." in text

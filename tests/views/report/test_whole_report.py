@@ -110,7 +110,7 @@ ON_DEMAND = (
 )  # sections of stages that run only by their own commands
 
 
-def test_report_excludes_stages_that_only_their_command_runs(results):
+def test_report_excludes_stages_that_run_only_on_demand(results):
     makers = [make for make in SECTIONS if make.__module__.endswith(ON_DEMAND)]
     assert len(makers) == len(ON_DEMAND) + 1, "the section of measurements to make is in identification, too"
     assert [make(results) for make in makers] == [None] * len(makers)

@@ -37,7 +37,7 @@ from walkerlab.scene.rigid import rigid_walker
 RUN_BUDGET = 200_000  # limit of a compiled run, so that hopeless runs end
 # The steps of a library run in Python, so a right-hand side takes a hundred times as long.
 LIBRARY_RUN_BUDGET = 20_000  # limit of a run with a library
-LAST_RUN_SIZE = 12_000  # the ladder of a library ends after a run of this size
+LAST_RUN_SIZE = 12_000  # a library is not run at tighter tolerances once a run reaches this size
 WARM_UP_BUDGET = 2_000  # enough for everything to be compiled and loaded
 MAX_REPEATS = 7
 REPEAT_TIME_S = 0.2  # time for all repeats of a run

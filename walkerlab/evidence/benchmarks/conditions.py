@@ -1,4 +1,4 @@
-"""Conditions under which benchmarks run: the machine, and a first stance foot that is free."""
+"""Conditions under which benchmarks run: the machine, and the rule that no foot is pinned at the start."""
 
 import os
 import platform

@@ -81,7 +81,7 @@ def method_series(scene: str, results: Results) -> Iterator[Series]:
 
 
 def draw_methods(scene: str, results: Results) -> Drawn:
-    """Plot errors over run time (left) and over right-hand sides (right), with crosses for failed runs."""
+    """Plot errors against run time (left) and right-hand sides evaluated (right), with crosses for failed runs."""
     all_series = list(method_series(scene, results))
     summary = results["accuracy"].summary
     reference = summary["reference"][scene]
@@ -153,8 +153,8 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Plot errors over run time: under our law (left) and on the native contact of each engine (right)."""
-    # Both axes use the same line styles and markers, so each needs a separate legend.
+    """Plot errors against run time, under our law (left) and on the native contact of each engine (right)."""
+    # Both axes use the same line styles and markers for different series, so each needs a separate legend.
     figure, panes = panels(4.6, 1, 2)
     experiments = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),

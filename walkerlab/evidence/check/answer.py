@@ -50,7 +50,7 @@ def refuse_unknown(check: Check) -> None:
             raise ConfigError(f"check.printed: a gait has no {name}.{hint}", f"Choose from {', '.join(known)}.", place)
     for name, texts in printed_states(check).items():
         if isinstance(texts, str):
-            raise ConfigError(f"check.printed: {name} is one value.", "Give a list of angles and rates.")
+            raise ConfigError(f"check.printed: {name} is one value, not a list.", "Give a list of angles and rates.")
 
 
 def printed_states(check: Check) -> dict[str, Any]:

@@ -25,12 +25,12 @@ def check(
         typer.Argument(metavar="FILE...", help="Configs with a block `check`, or folders of such configs."),
     ] = None,
     state: Annotated[
-        str | None, typer.Option(metavar="NUMBERS", help="A printed state, in quotes, of the walker of --config.")
+        str | None, typer.Option(metavar="NUMBERS", help="Printed state, in quotes, of the walker in --config.")
     ] = None,
 ) -> None:
     """Check a printed gait: is it right, and if not, why?"""
     if state is not None and files:
-        raise typer.BadParameter("takes the walker of --config, so give no FILE", param_hint="--state")
+        raise typer.BadParameter("takes the walker in --config, so give no FILE", param_hint="--state")
     paths = [*(files or ()), *([Path(request.config)] if request.config else [])]
     if not paths:
         raise typer.BadParameter("name a config with a block `check`; `walkerlab init FILE --check` writes one")

@@ -30,14 +30,15 @@ from walkerlab.labels import join_words
 MAX_SOLVED: Final = 5  # number of candidates whose gaits are solved
 FARTHEST_GUESS = 0.3  # rad, distance from the printed state above which a first guess has no meaning
 SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
-# rounds in which the size of a mistake is fitted, and how many times closer the fit must bring gaits
+# maximum number of rounds in which the size of a mistake is fitted, and the factor by which the fit must reduce the
+# largest deviation from the printed values
 FITTING_ROUNDS, MIN_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # a round size is tried if it is this close to the fitted one (relative)
 MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all if fewer are printed
-MUCH_CLOSER = 5.0  # a cause must bring gaits this many times closer to be reported
+MUCH_CLOSER = 5.0  # a cause is reported only if it brings gaits this many times closer to the printed values
 READINGS = 3  # number of other conventions in which we search for mistakes
-# conventions that miss by up to this many times as much as the nearest one are ranked by their number of changes
+# Conventions whose deviation is at most this multiple of the smallest one are ranked by their number of changes.
 NEAR_FACTOR = 4.0
 CONVERGED: Final = 1e-6  # a fit ends when its value changes by less than this (relative)
 SLOPE = "slope_rad"
@@ -193,9 +194,10 @@ class Question:
         return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
-        """Return a first guess of a walker's gait: a Newton step from the printed state or, without it, the right gait.
+        """Return a first guess of a walker's gait, by one Newton step.
 
-        Return None if that leads nowhere.
+        The step begins at the printed state or, if no state is printed, at the start of the right gait. Returns None if
+        it leads nowhere.
         """
         start = (
             self.right.start if self.state is None else plain.start_from(walker, self.state, self.convention.instant)

@@ -79,7 +79,7 @@ class Convention:
     order: tuple[str, ...]
     layout: str
     instant: Instant
-    steps: int = 1  # steps that a printed period, length or multiplier belongs to
+    steps: int = 1  # number of steps to which a printed period, length or multiplier refers
     time: str = ""  # unit of time, or gravity that was used. Empty for seconds and the config's gravity
 
     def rows(self, bodies: int) -> Floats:
@@ -100,7 +100,7 @@ class Convention:
 
     @property
     def names(self) -> list[str]:
-        """Names of the numbers of a printed state."""
+        """Names of the components of a printed state, in the printed order."""
         return self.arrange(np.array([[f"{body}_{kind}" for body in self.order] for kind in ("angle", "rate")]))
 
     def write(self, walker: PlainWalker, state: Floats) -> list[float]:

@@ -86,7 +86,7 @@ class PlainWalker:
     # mistakes
     signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors for velocity terms, by phase
     keeps_trailing_rate: bool = False
-    # weights of the trailing and the leading leg's rates in the extra term I * rate of the balance at a strike
+    # weights of the trailing and leading legs' rates in a mistaken extra term, I * rate, of the balance at a strike
     extra_inertia: tuple[float, float] = (0.0, 0.0)
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
     # whether the trailing leg turned about the same point of its foot before the strike
@@ -208,7 +208,7 @@ class PlainWalker:
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return how far (rad) the sum of both legs' angles is from `window`, where the swing foot touches."""
+        """Return the sum of both legs' angles (rad) minus the sum at which the swing foot touches."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
@@ -366,7 +366,7 @@ def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> P
 def land(walker: PlainWalker, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
     """Return the pieces of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
     pieces: tuple[Piece, ...] = ()
-    # If the leg is straight, its foot behind the stance foot shows that the knee has only just been released.
+    # If the leg is straight but its foot is behind the stance foot, the knee has only just been released.
     if walker.kneed and (walker.knee_bend(state) != 0.0 or walker.swing_foot(state).real < 0.0):
         locked = swing_until(walker, BENT, state, walker.knee_bend, lambda _: True, tolerance)
         if locked is None:
@@ -464,7 +464,7 @@ def why_not_plain(config: RigidConfig) -> str:
 
 
 def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
-    """Build the plain model of a config's walker. If `changed` is given, that walker stands on the slope instead."""
+    """Build the plain model of a config's walker or, if given, of the walker `changed` on the same slope."""
     walker = changed or config.walker
     assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
     # Only the contact model lets the compass roll on its ball feet.

@@ -16,9 +16,9 @@ UNEXPLAINED = "different, unexplained"
 # A value counts as reproduced if at least this many of its digits agree, and at least half of them.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
-"""Numerical errors of right values, by quantity. `EXACT_ERROR` is that of all other quantities."""
-EXACT_ERROR = 2e-12  # numerical error of right values, absolute below 1 and relative above
-MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
+"""Numerical errors of the correct values, by quantity. `EXACT_ERROR` is that of all other quantities."""
+EXACT_ERROR = 2e-12  # numerical error of the correct values, absolute below 1 and relative above
+MORE_DIGITS: Final = 2  # number of digits that we show of a correct value beyond the printed ones
 MOST_DECIMALS: Final = 12
 
 
@@ -67,7 +67,7 @@ class PrintedNumber:
         return max(0.5 * (high - low), self.digits.unit) if math.isfinite(high - low) else self.digits.unit
 
     def agreeing(self, right: complex) -> int:
-        """Count the printed digits that agree with the right value, which may be rounded or truncated."""
+        """Count the printed digits that agree with the correct value, which may be rounded or truncated."""
         error = OWN_ERROR.get(self.quantity, EXACT_ERROR) * max(1.0, abs(right))
         if self.printed.bounds is not None:
             low, high = self.printed.bounds
@@ -97,7 +97,7 @@ class PrintedNumber:
         return abs(right - self.printed.value) / self.last_digit
 
     def write(self, right: complex) -> str:
-        """Format a right value with `MORE_DIGITS` more digits than the printed one."""
+        """Format the correct value with `MORE_DIGITS` more digits than the printed one."""
         decimals = min(max(round(-math.log10(self.digits.unit)) + MORE_DIGITS, 0), MOST_DECIMALS)
         text = f"{right.real:.{decimals}f}"
         if self.printed.imaginary is None and not right.imag:

@@ -18,7 +18,7 @@ TONES: Mapping[str, Tone] = {
 }  # fmt: skip
 """Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
 MANY_UNITS = 1e5  # a larger difference, in units of the last digit, is not shown
-LONGEST_LIST = 2  # longer states are mentioned as a whole, if they are complete
+LONGEST_LIST = 2  # a longer state is named as a whole if all its values are to be named
 COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),
@@ -110,7 +110,7 @@ def follow(explanation: Row, rows: Sequence[Row]) -> str:
 
 
 def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
-    """Enumerate printed values in words. A long state that is complete is mentioned as a whole.
+    """List the names of printed values in words. A long state is one item of the list if all its values are in it.
 
     rows  rows of all printed values
     """

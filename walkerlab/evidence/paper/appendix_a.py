@@ -74,16 +74,16 @@ def accelerations(
 
 
 def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
-    """Return the distance (m) of the feet when both are on the slope: 2 L sin((theta_2 - theta_1)/2)."""
+    """Return the distance (m) between the feet when both are on the slope: 2 L sin((theta_2 - theta_1)/2)."""
     return 2.0 * walker.leg_length * math.sin(0.5 * (theta_2 - theta_1))
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
     """Return the entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-. Legs keep their numbers in the impact.
 
-    They follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the impulse.
-    With the right sign in (A.55) they depend only on cos(theta_2 - theta_1). B_21 is 0, because the trailing leg
-    keeps its angular momentum about the hip.
+    The entries follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the
+    impulse. With the right sign in (A.55) they depend only on cos(theta_2 - theta_1). B_21 is 0, because the trailing
+    leg keeps its angular momentum about the hip.
     """
     c = swing_constants(walker)
     L = walker.leg_length

@@ -286,7 +286,7 @@ COLUMN_NAMES = {
     "verdict": ", ".join(VERDICTS),
     "evidence": "evidence",
 }
-"""Long names of the columns in the tables of the paper and of all its numbers."""
+"""Long names of the columns, for the tables of the paper and for the table of all its numbers."""
 
 
 def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:

@@ -113,7 +113,7 @@ MIN_ERROR = 1e-14
 
 
 def draw_limit(results: Results) -> Drawn:
-    """Plot errors over run time, one point per setting, from the config's contact to the most rigid one."""
+    """Plot errors against run time, one point per setting, from the config's contact to the most rigid one."""
     figure = blank(3.6)
     claimed = bool(walks.claims_in(results))
     # Walkers whose feet roll in both models have no series with point feet.

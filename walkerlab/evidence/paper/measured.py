@@ -1,6 +1,6 @@
 """Measurements to compare with the printed numbers: from both sets of rigid equations, and from the contact model.
 
-Measurements on another scene than that of the paper neither confirm nor refute its numbers.
+Measurements on a scene other than that of the paper neither confirm nor refute its numbers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -268,7 +268,7 @@ class AdamsWalk:
     rigid: AdamsStart  # walk of the rigid model from the same start, both feet on the config's slope
     walk: ContactWalkResult
     airborne_from: float | None  # s, first time at which no foot touches the ground, or None if one always does
-    # N, largest normal force of the contact model after the rigid model's ground would have to pull
+    # N, largest normal force of the contact model after the moment at which the rigid model's ground would have to pull
     later_normal_force: float | None
     normal: NDArray[np.float64]  # (samples, leg) N, normal forces of the contact model
     mechanical: NDArray[np.float64]  # (samples,) J, kinetic and potential energy of the contact model

@@ -232,7 +232,7 @@ def percentages() -> Iterator[tuple[Printed, str]]:
 
 
 def percent_left_open(row: StartRow) -> Interval:
-    """Return the interval (%) of the change in magnitude from MATLAB to ADAMS that rounding leaves open."""
+    """Return the interval (%) of the change in magnitude from MATLAB to ADAMS, given the rounding of both values."""
     return interval(lambda adams, matlab: 100.0 * (abs(adams) / abs(matlab) - 1.0), row.adams, row.matlab)
 
 

@@ -27,7 +27,9 @@ VERDICTS = (
 )
 """Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
-"""A mismatch counts only if this model has the paper's scene. With "any" it always counts: printed values decide."""
+"""Model that must have the paper's scene for a mismatch to count. With "any" a mismatch always counts, because the
+verdict depends only on printed values.
+"""
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
@@ -87,7 +89,7 @@ class Judge:
 
         rigid    values of the rigid model, by set of equations
         contact  value of the contact model, or None if it has no such value
-        verdict  verdict that holds unless other values of the paper contradict this one, or the scene is another
+        verdict  verdict that holds unless other values of the paper contradict this one or the scene is not the paper's
         """
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
@@ -148,7 +150,7 @@ class Judge:
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> Judged:
-        """Judge the five gait cycles. They are an input, because the rigid model walks as many."""
+        """Judge the five gait cycles. They are an input, because the rigid model is told to walk that many."""
         entry = printed.CYCLES_WALKED
         contact = self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
@@ -250,7 +252,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """Return the initial values, and how much MATLAB and ADAMS differ, in percent of either."""
+    """Return the initial values, and the difference between MATLAB and ADAMS as a percentage of each."""
     table = {}
     start = measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):

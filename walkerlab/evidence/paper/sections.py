@@ -16,7 +16,7 @@ from walkerlab.views.report.words import describe_error, words
 Row = Mapping[str, Any]
 
 TEXT_SUFFIX = "_text"
-"""Suffix of the keys whose values are numbers as printed, which are texts."""
+"""Suffix of the keys whose values are printed numbers, stored as text."""
 MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact": "contact model"}
 """Headers of the columns with which the numbers of the paper are compared, by key."""
 

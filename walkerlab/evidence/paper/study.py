@@ -1,6 +1,7 @@
 """Measurements on the walker and the slope of the paper, and the errata that they support. No config affects them.
 
-Some measurements keep the misprints of Appendix A. Their heel strike solves the six equations of (A.57) as printed.
+Some measurements keep the misprints of Appendix A. In these, the heel strike solves the six equations of (A.57) as
+printed.
 """
 
 import math

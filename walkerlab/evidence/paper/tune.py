@@ -215,7 +215,9 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """Build a group for each series: its settings, and how far gait and, if compared, walk are from the rigid ones."""
+    """Build a group for each series, with its settings and the distances of the gait and (if compared) of the walk from
+    the rigid ones.
+    """
     groups = {}
     text = "number of the setting, beginning with the config's contact"
     for series, rows in findings.series.items():

@@ -169,7 +169,8 @@ def scale_block(block: B, by: Units, special: Mapping[str, float]) -> B:
 
 def scale_config(config: Config, by: Units) -> Config:
     """Return the config of a similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
-    # A law of an extension may give its parameters units of its own. Hip and knees name them alike.
+    # A law of an extension may give its parameters other units. Hip and knees use the same names for them, so one
+    # mapping serves both.
     law_units = hinge_law_of(config.walker).units(by.energy, by.time)
     walker = scale_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True)))
     changes: dict[str, object] = {

@@ -71,7 +71,7 @@ class Choice:
 
     case: str
     method: str
-    verdict: str  # fine, wrong silently, gives up, diverges
+    verdict: str  # "fine", "wrong silently", "gives up" or "diverges"
     error: float | None  # error of the final state, or None if the method gave up or diverged
     rhs_evaluations: int
     wall_s: float
@@ -189,7 +189,8 @@ def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINA
     began = time.perf_counter()
     steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
-    # The sum of exactly enough steps may end a little early due to rounding, which must not count as giving up.
+    # Even if the number of steps is just enough, rounding can leave their sum a little short. That must not count as
+    # giving up.
     late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
     return arrival.judge_end(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)
 

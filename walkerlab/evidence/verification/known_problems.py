@@ -28,7 +28,8 @@ from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.store.content import Content, rows_group
 
-# Pads of this length have no edge in reach. Its negative serves as leg length, so that no hip is low enough for a fall.
+# Pads of this length have no edge in reach. Minus this length is used as leg length, so that the hip is never low
+# enough to count as a fall.
 UNBOUNDED_M = 1e7
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, position of an inactive foot
 PROBLEM_BUDGET = 2_000_000  # right-hand sides
@@ -88,7 +89,7 @@ def run_until(
     ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground, 1, 1, start)
     walk_state.at_zero[:] = 0
-    # The rule that ends walks without heel strikes ends the run at its duration.
+    # Date the last touch so that the rule that ends walks without heel strikes ends this run at `duration_s`.
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
     times = np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
     observer = new_observer(walker, walk_state, start, times)
@@ -159,7 +160,7 @@ def bouncing_ball_period() -> float:
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / EARTH_GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, EARTH_GRAVITY)
-    # In flight the time of the next landing follows exactly, so the run ends there.
+    # End the run in flight, from where the time of the next landing can be computed exactly.
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
     height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
     until_landing = (rise + math.sqrt(rise**2 + 2.0 * EARTH_GRAVITY * height)) / EARTH_GRAVITY
@@ -199,7 +200,8 @@ ROUNDS = 14
 def rimless_wheel_speed() -> float:
     """Return the angular speed (rad/s) of a steadily rolling wheel at the moment when a spoke is normal to the slope.
 
-    A run has only two spokes and turns the wheel from one to the other. The next run starts with the final speed.
+    Each run simulates the wheel with two spokes only, while it rolls from one to the other. The next run starts at the
+    final speed of the last.
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))

@@ -1,4 +1,7 @@
-"""References for the known problems that do not use the contact code: closed forms, or SciPy on laws coded again."""
+"""Reference solutions of the known problems, computed without the contact code.
+
+They are closed forms, or solutions by SciPy with a second implementation of the laws.
+"""
 
 import math
 from typing import Any
@@ -35,7 +38,7 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
         return y[1], gravity - impact_force(y[0], y[1], law) / mass
 
     def leave(t: float, y: Any) -> float:
-        # The ball is at the surface also when it lands, which must not end the integration.
+        # The ball is also at the surface when it lands, which must not end the integration.
         return float(y[0]) if t > 0.0 else 1.0
 
     leave.terminal, leave.direction = True, -1.0  # type: ignore[attr-defined]

@@ -59,9 +59,9 @@ def prepare_on_ground(
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     """Simulate a walk with the default method at one stiffness (N/m^e) and stiction velocity (m/s).
 
-    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks (in
-    leg lengths, rad and pendulum times, or `ERROR_MISSING` if outcome or step count differ), and the number of
-    right-hand sides.
+    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference between the
+    two walks (in leg lengths, rad and pendulum times, or `ERROR_MISSING` if outcome or step count differ), and the
+    number of right-hand sides.
     """
     case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
     walk = again = start.walk(case, case_tolerances(start, case))

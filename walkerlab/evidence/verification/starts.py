@@ -244,8 +244,8 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
-    # The balance holds along the computed path, also where this departs from the exact one. So errors of steps add up
-    # without growing, and MAGNIFIED does not apply.
+    # The balance holds along the computed path, even where this path departs from the exact one. So errors of steps
+    # add up without growing, and MAGNIFIED does not apply.
     limit = allowed_difference(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(balance.residual), limit)
 

@@ -32,7 +32,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class NotMeasured:
-    """A measure that could not be taken, with the reason."""
+    """A measure that could not be computed, with the reason."""
 
     measure: str
     why: str
@@ -52,11 +52,11 @@ class CaseResult:
     energy_balance_residual_J: Annotated[float, Label("J", "largest residual of the energy balance")] = 0.0  # noqa: N815
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")] = 0
     wall_s: float = 0.0
-    findings: tuple[Measure, ...] = ()  # measures taken
+    findings: tuple[Measure, ...] = ()  # measures that were computed
     remarks: tuple[str, ...] = ()  # descriptions of further faults
     second_method: str = ""  # method of the second walk, empty if no other method had an answer
     second_tried: str = ""  # failed methods with their outcomes, or the reason why none was tried
-    not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be taken
+    not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be computed
 
     @property
     def failures(self) -> tuple[str, ...]:

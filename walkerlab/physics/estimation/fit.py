@@ -12,17 +12,8 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.estimation.mixed_model import (
-    Evaluation,
-    Linearised,
-    Noise,
-    Reduced,
-    estimate_noise,
-    evaluate,
-    most_probable_disturbances,
-    reduce,
-    whitening,
-)
+from walkerlab.physics.estimation import mixed_model
+from walkerlab.physics.estimation.mixed_model import Evaluation, Linearised, Noise, Reduced, evaluate, reduce
 from walkerlab.physics.estimation.prediction import Forecast, Prediction
 from walkerlab.physics.solvers.system import Floats
 
@@ -157,12 +148,10 @@ def fit(
     """
     forecast = problem.forecast
     u = start.copy()
-    even = np.zeros(forecast.heights)
+    disturbances = heights = even = np.zeros(forecast.heights)
     noise = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0)
-    heights = even
     end = FitEnd.STILL_CHANGES
     data = linearise(problem, u, heights)
-    disturbances = heights
     if data is None:
         return None
     robust = None
@@ -181,12 +170,12 @@ def fit(
             return None
         rows = reduce(data)
         earlier = noise
-        noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, noise, noises)
+        noise, noises = mixed_model.estimate_noise(rows, problem.floors, problem.leg_length_m, noise, noises)
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
             noise = average_noise(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation = evaluate(rows, noise)
         robust = robust_scatter(rows, noise)
-        disturbances = most_probable_disturbances(rows, noise, evaluation.move)
+        disturbances = mixed_model.most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
         heights = reduce_heights(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
         disturbances[: heights.size] = heights
@@ -234,9 +223,9 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     if data is None or predicted is None:
         return None
     rows = reduce(data)
-    noise, noises = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise, like.noises)
+    noise, noises = mixed_model.estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise, like.noises)
     evaluation = evaluate(rows, noise)
-    disturbances = most_probable_disturbances(rows, noise, evaluation.move)
+    disturbances = mixed_model.most_probable_disturbances(rows, noise, evaluation.move)
     return Fitted(problem, u, disturbances, noise, noises, evaluation, data, predicted, like.end)
 
 
@@ -270,9 +259,8 @@ def gain_of(rows: Reduced, before: Noise, after: Noise) -> float:
 
 def typical_sizes(forecast: Forecast) -> Floats:
     """Return the r.m.s. value (quantities,) of each quantity as its typical size."""
-    values = forecast.values
-    quantity = forecast.quantity
-    return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
+    groups = (forecast.values[forecast.quantity == q] for q in range(len(forecast.quantities)))
+    return np.array([np.sqrt(np.mean(values**2)) for values in groups])
 
 
 def linearise(
@@ -352,7 +340,7 @@ def least_squares_fit(
     low_high = problem.limits()
     # SciPy refuses a start on a bound, but the last round may have ended there.
     inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
-    whiten = whitening(data, noise)
+    whiten = mixed_model.whitening(data, noise)
     # Derivatives cost one walk per parameter, so the last ones are reused while the unknowns have hardly moved.
     known = (inside, data.J)
     offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
@@ -371,5 +359,4 @@ def least_squares_fit(
         return np.vstack((data_rows, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
 
     settings = {"max_nfev": EVALUATIONS, "xtol": FIT_TOLERANCE, "ftol": FIT_TOLERANCE}
-    result = least_squares(residuals, inside, jacobian, low_high, **settings)
-    return np.asarray(result.x)
+    return np.asarray(least_squares(residuals, inside, jacobian, low_high, **settings).x)

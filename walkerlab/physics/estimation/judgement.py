@@ -65,10 +65,8 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
         large = abs(residuals[worst]) * fitted.noise.measurement[index] > SMALLEST_OUTLIER * sizes[index]
         if large and abs(residuals[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
             times = abs(residuals[worst]) / spread
-            return (
-                "misfit",
-                f"the {name} of step {worst + 1} deviates by {times:.2g} times the scatter of the other steps",
-            )
+            reason = f"the {name} of step {worst + 1} deviates by {times:.2g} times the scatter of the other steps"
+            return "misfit", reason
     if limp:
         return "misfit", limp
     if forecast.measured.sampled:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredWalk
 from walkerlab.physics.orbits.robustness import derivative
-from walkerlab.physics.orbits.step_map import DisturbedWalk, MappedStep, VariedWalk
+from walkerlab.physics.orbits.step_map import DisturbedWalk, StepMap, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK = "clock_rate"
@@ -39,37 +39,6 @@ EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients
 SAMPLED_STEP: Final = 1e-5
 # number of cached predictions, since search, derivatives and checks request the same walks
 KEPT_PREDICTIONS: Final = 16
-
-
-class WalkMap(Protocol):
-    """Walks of a family of walkers, which start on the section. It is like `step_map.StepMap`, but with several
-    parameters.
-    """
-
-    stride: int  # number of steps after which the map repeats: 2 for legs that differ
-
-    def step(self, z: Floats, p: Any) -> MappedStep:
-        """Take a step from z (d,), with its derivative."""
-
-    def take_disturbed_walk(self, z: Floats, p: Any, heights_m: Floats) -> DisturbedWalk:
-        """Walk from z (d,) over foothold heights (steps + 1,) in m."""
-
-    def rest_on_ground(self, z: Floats, p: Any) -> Floats:
-        """Return z (d,) with the stance foot at rest on the ground."""
-
-    def sample_legs(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
-        """Return the angles of the legs (times, 2). The leg that swings first is column 0.
-
-        times_s  (times,) times from the first heel strike
-        """
-
-    def differentiate_walk(
-        self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ..., kicked: bool = ...
-    ) -> VariedWalk | None:
-        """Differentiate the walk and its samples along each column of `along` and, if `kicked`, with respect to kicks.
-
-        along  (d + steps + 1, columns) changes of z and of the heights (m)
-        """
 
 
 class Prediction(NamedTuple):
@@ -146,28 +115,20 @@ class Readings:
         """Return the sample times (samples,) from the first heel strike of the walk, and whether each is within the
         walk.
         """
-        touches = np.append(0.0, np.cumsum(walk.durations_s))
-        step = self.measured.step
-        times = self.measured_times() / sensors[CLOCK]
-        if self.in_phase:
-            times = touches[step] + self.measured.phase * walk.durations_s[step]
-        times = times + sensors[DELAY]
-        last = touches[-1] * (1.0 - LAST_INSTANT)
+        durations, rate = (walk.durations_s, 1.0) if self.in_phase else (self.measured.periods_s, sensors[CLOCK])
+        times = self.times_in_steps(durations) / rate + sensors[DELAY]
+        last = np.cumsum(walk.durations_s)[-1] * (1.0 - LAST_INSTANT)
         return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
-    def measured_times(self) -> Floats:
-        """Return the sample times (samples,) from the first measured heel strike, by the clock of the measurement."""
-        touches = np.append(0.0, np.cumsum(self.measured.periods_s))
-        step = self.measured.step
-        return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])
+    def times_in_steps(self, durations: Floats) -> Floats:
+        """Return the sample times (samples, ...), from the first heel strike, in steps of these durations (steps, ...).
 
-    def sample_time_changes(self, durations: Floats) -> Floats:
-        """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
-        if not self.in_phase:
-            return np.zeros((self.measured.step.size, durations.shape[1]))
-        touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))
+        With the measured periods, they are the times by the clock of the measurement. The times are linear in the
+        durations, so this also converts changes of durations to changes of times.
+        """
+        touches = np.concatenate((np.zeros_like(durations[:1]), np.cumsum(durations, axis=0)))
         step = self.measured.step
-        return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
+        return np.asarray(touches[step] + (self.measured.phase * durations[step].T).T)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -177,7 +138,7 @@ class Forecast(Readings):
     The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each divided by its scale.
     """
 
-    walks: WalkMap
+    walks: StepMap  # walks of a family of walkers with several parameters, so p is a tuple, not a number
     admits: Callable[[tuple[float, ...]], bool]  # whether parameters give a valid walker
     scales: Floats  # (parameters,) typical changes
     z: Floats  # (d,) section coordinates around which the start is searched for
@@ -193,7 +154,7 @@ class Forecast(Readings):
         """Number of footholds, with one more for angles at sample times, in case predicted steps are shorter."""
         return self.measured.count + (1 if self.in_phase else 2)
 
-    def parameters(self, u: Floats) -> tuple[float, ...]:
+    def parameters(self, u: Floats) -> Any:
         return tuple((u[: self.scales.size] * self.scales).tolist())
 
     def start(self, u: Floats) -> Floats:
@@ -216,11 +177,7 @@ class Forecast(Readings):
     @cached_property
     def _recent(self) -> Any:
         # Arrays cannot be keys of a cache, so use their bytes.
-        @lru_cache(KEPT_PREDICTIONS)
-        def predict(u: bytes, heights_m: bytes) -> Prediction | None:
-            return self._predict(np.frombuffer(u), np.frombuffer(heights_m))
-
-        return predict
+        return lru_cache(KEPT_PREDICTIONS)(lambda *arrays: self._predict(*map(np.frombuffer, arrays)))
 
     def _predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
         p = self.parameters(u)
@@ -286,25 +243,23 @@ class Forecast(Readings):
         z = self.start(u)
         starts = self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
-        settling = differentiate_settling(
-            self.walks, self._start_before_settling(u), self.parameters(u), self.directions
-        )
+        p = self.parameters(u)
+        settling = differentiate_settling(self.walks, self._start_before_settling(u), p, self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
         kicked = self.kicked and lifts.size > 0
-        varied = self.walks.differentiate_walk(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
+        varied = self.walks.differentiate_walk(z, p, heights_m, along, prediction.times_s, kicked)
         if varied is None:
             return None
         angles = prediction.angles_rad
         count = self.measured.count
         # A sample outside the walk has the angle at the nearest end of the walk, so its time has no effect.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
-        moving = (
-            varied.samples_rad * sensors[GAIN]
-            + rates[:, None] * self.sample_time_changes(varied.durations_s)[:, :, None]
-        )
+        moving = varied.samples_rad * sensors[GAIN]
+        if self.in_phase:
+            moving += rates[:, None] * self.times_in_steps(varied.durations_s)[:, :, None]
         moves = np.concatenate((*self.step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))
         # The time of a sample in the model is its measured time divided by the rate of the clock.
-        clock = 0.0 if self.in_phase else -self.measured_times()[:, None] / sensors[CLOCK] ** 2
+        clock = 0.0 if self.in_phase else -self.times_in_steps(self.measured.periods_s)[:, None] / sensors[CLOCK] ** 2
         by_name = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))
         for column, name in zip(by_sensor.T, self.nuisances, strict=True):
@@ -315,19 +270,17 @@ class Forecast(Readings):
         return moves, by_sensor
 
 
-def differentiate_settling(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
+def differentiate_settling(walks: StepMap, z: Floats, p: Any, directions: Floats) -> Floats:
     """Return the derivative of the start after `rest_on_ground` with respect to the start before, z (d,).
 
     directions  (d, starts) directions of z, one derivative for each column
     """
-    h = SETTLING_STEP
-    ends = [
-        walks.rest_on_ground(z + h * column, p) - walks.rest_on_ground(z - h * column, p) for column in directions.T
-    ]
-    return np.array(ends).reshape(-1, z.size).T / (2.0 * h)
+    moves = SETTLING_STEP * directions.T
+    ends = [walks.rest_on_ground(z + move, p) - walks.rest_on_ground(z - move, p) for move in moves]
+    return np.array(ends).reshape(-1, z.size).T / (2.0 * SETTLING_STEP)
 
 
-def effective_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
+def effective_directions(walks: StepMap, z: Floats, p: Any) -> Floats:
     """Return the directions (d, starts) in which a change of the start z (d,) affects the next step."""
     DP = walks.step(walks.rest_on_ground(z, p), p).DP
     _, sizes, rows = np.linalg.svd(DP @ differentiate_settling(walks, z, p, np.eye(z.size)))

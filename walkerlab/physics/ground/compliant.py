@@ -25,9 +25,8 @@ class KneeRules:
     # With a compliant stop, thigh and shank of a locked knee stay separate bodies at the angle at which it latched.
 
     stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
-    release_at_touch: bool = (
-        False  # whether to release the trailing knee at the touch, before the other foot has sunk in
-    )
+    # whether to release the trailing knee at the touch, before the other foot has sunk in
+    release_at_touch: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,8 @@ def potential_energy(form: GroundModel, y: Any) -> float:
     s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
     forms.sines_cosines(form, y, s, c)
     tree.projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
-    if form.places > 0:
-        return tree.potential_energy(form, form.bodies, y[0], y[1], F, U)
-    return tree.potential_energy(form, form.bodies, form.root_along, form.root_height, F, U)
+    along, height = forms.root_position(form, y)
+    return tree.potential_energy(form, form.bodies, along, height, F, U)
 
 
 @kernel_part
@@ -60,8 +59,7 @@ def total_energy(system: OnGround, y: Any) -> float:
 def push_power(system: OnGround, t: float, y: Any) -> float:
     if system.form.push_off == 0.0:
         return 0.0
-    s = vector(BODY_VECTOR)
-    c = vector(BODY_VECTOR)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     foot = 1 - system.progress.stance
     forms.sines_cosines(system.form, y, s, c)
     push = push_on(system, t, foot, s, c)

@@ -38,8 +38,7 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
     """
     form = system.form
     y = vector(STATE_VECTOR)
-    s = vector(BODY_VECTOR)
-    c = vector(BODY_VECTOR)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     torques = vector(BODY_VECTOR)
     absolute_state(form.slope, chain, q, v, y)
     sines_cosines(form, y, s, c)

@@ -88,9 +88,8 @@ class Coulomb(NamedTuple):
         return self.friction_velocity
 
     def scale_creep(self, factor: float) -> Coulomb:
-        return self._replace(
-            stiction_velocity=factor * self.stiction_velocity, friction_velocity=factor * self.friction_velocity
-        )
+        v_s, v_d = factor * self.stiction_velocity, factor * self.friction_velocity
+        return self._replace(stiction_velocity=v_s, friction_velocity=v_d)
 
     def describe(self) -> str:
         return (
@@ -109,8 +108,7 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
     if v < v_s:
         # One cubic, odd in the slip, covers both directions. It falls from mu_s to -mu_s, because friction opposes
         # slip.
-        mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
-        return mu, slope
+        return smooth_step(slip, -v_s, law.static, v_s, -law.static)
     mu, slope = smooth_step(v, v_s, law.static, law.friction_velocity, law.dynamic)
     # The force and the derivative of |slip| both change sign with the slip, so the derivative of the force is -slope in
     # both directions.

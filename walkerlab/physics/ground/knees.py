@@ -72,14 +72,13 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     n = int(whole.bodies)
     p = int(whole.places)
     # The bodies' rates are the last n entries, with and without coordinates of the root.
-    rates = x.size - int(whole.bodies)
+    rates = x.size - n
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)
     # Bodies of a group have the same row, and the column of a group is that of its first body.
     E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
-    pairs = (whole.A[:n, :n], whole.B[:n, :n])
-    arms = (whole.arm_x[:n], whole.arm_y[:n])
+    A, B, arm_x, arm_y = whole.A[:n, :n], whole.B[:n, :n], whole.arm_x[:n], whole.arm_y[:n]
     # The impulse in the knee moves neither the centre of mass nor a pinned foot, so the root counts as fixed: radius 0.
-    tree = RootedTree(*pairs, *arms, whole.mass, 0.0, whole.slope)
+    tree = RootedTree(A, B, arm_x, arm_y, whole.mass, 0.0, whole.slope)
     x[rates:], lost, after[rates:] = lock(tree, E, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
     return Locked(x, lost, after)

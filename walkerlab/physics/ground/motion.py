@@ -126,8 +126,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
     pushed = push.above != 0.0
     if not inside and not pushed:
         return
-    F = vector(BODY_VECTOR)
-    U = vector(BODY_VECTOR)
+    F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
     p = form.places
     half = forms.half_size(form)
     tree.projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
@@ -183,10 +182,7 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     n = form.bodies
     p = form.places
     half = forms.half_size(form)
-    s = vector(BODY_VECTOR)
-    c = vector(BODY_VECTOR)
-    alpha = vector(BODY_VECTOR)
-    M = matrix(BODY_VECTOR)
+    s, c, alpha, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
     by_torque = matrix(BODY_VECTOR)
     for i in range(half):
         for j in range(2 * half):

@@ -134,9 +134,7 @@ def impact_release_function(law: Impact, penetration: float, penetration_rate: f
 @elastic_energy.case(Impact)
 def impact_elastic_energy(law: Impact, penetration: float) -> float:
     """Compute k d^(e+1) / (e+1)."""
-    if penetration <= 0.0:
-        return 0.0
-    return law.stiffness * penetration ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    return law.stiffness * max(penetration, 0.0) ** (law.exponent + 1.0) / (law.exponent + 1.0)
 
 
 @switching_penetration.case(Impact)

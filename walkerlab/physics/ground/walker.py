@@ -10,7 +10,7 @@ fewer bodies. While the first stance foot is pinned, the root is the hinge and t
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -57,14 +57,12 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     push_off_duration: float  # s
     onto: Integers  # (bodies of the walker,) index in this form of each of the walker's bodies
     first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
-    root_along: float  # m, position of the hinge along the slope
     root_height: float  # m, height of the hinge above the slope
 
     @property
     def knees(self) -> Integers:
         """Indices (2, 2) of the shank and thigh of each leg."""
-        bodies: Integers = self.hinges[FIRST_KNEE:]
-        return bodies
+        return np.asarray(self.hinges[FIRST_KNEE:])
 
 
 FORM_SHAPES: dict[str, tuple[int, ...]] = {
@@ -85,8 +83,7 @@ class ContactWalker(NamedTuple):
     @property
     def whole(self) -> GroundModel:
         """Free form with all bodies and no knee locked."""
-        form: GroundModel = self.forms[0, 0]
-        return form
+        return cast(GroundModel, self.forms[0, 0])
 
     @property
     def size(self) -> int:
@@ -148,8 +145,7 @@ def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Wa
 
     last_touch  s, time at which the last step ended
     """
-    progress: WalkProgress = tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch)
-    return progress
+    return cast(WalkProgress, tree.new_record(PROGRESS, stance=stance, steps=steps, last_touch=last_touch))
 
 
 @pass_by_reference
@@ -210,19 +206,18 @@ def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
 
 
 @kernel_part
+def root_position(form: GroundModel, y: Any) -> tuple[float, float]:
+    """Return the position of the root along the slope and above it (m). The hinge of a pinned form is at 0."""
+    return (y[0], y[1]) if form.places > 0 else (0.0, form.root_height)
+
+
+@kernel_part
 def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     """Compute the motion of a ball foot's lowest point, with the slip of the ball's material at that point."""
     n = form.bodies
     half = half_size(form)
-    along = form.root_along
-    height = form.root_height
-    slip = 0.0
-    vertical_velocity = 0.0
-    if form.places > 0:
-        along = y[0]
-        height = y[1]
-        slip = y[half]
-        vertical_velocity = y[half + 1]
+    along, height = root_position(form, y)
+    slip, vertical_velocity = (y[half], y[half + 1]) if form.places > 0 else (0.0, 0.0)
     omega = y[half + form.places : 2 * half]
     ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
     for k in range(n):
@@ -279,8 +274,7 @@ def to_full(form: GroundModel, y: Any, size: int) -> Floats:
     """Convert a form's state to the full state (size,) of all bodies with the same root."""
     p = int(form.places)
     n = int(form.bodies)
-    every = size // 2 - int(form.places)
-    onto = form.onto[:every]
+    onto = form.onto[: size // 2 - p]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
 
 
@@ -301,7 +295,7 @@ def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     sines_cosines(form, y, s, c)
     along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
     # The arms are first moments. Divided by the mass, they are the vector from the hinge to the centre of mass.
-    whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass
+    whole[0], whole[1] = along / form.mass, form.root_height + height / form.mass
     whole[middle], whole[middle + 1] = speed / form.mass, vertical_velocity / form.mass
 
 

@@ -48,9 +48,8 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
         values[first + events.MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[events.PASSING, node] += motion.along if foot == 1 else -motion.along
     stance = walk_state.progress.stance
-    values[events.FALL, node] = (
-        hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
-    )
+    hip = hip_height(form, s, c, y) - walk_state.level[stance]
+    values[events.FALL, node] = hip - FALLEN_HIP * ground.frame.leg_length
     away = values[stance * events.PER_FOOT + events.MATERIAL, node] - walk_state.touched[stance]
     # The slide is squared, so that one smooth function covers both directions.
     values[events.SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2

@@ -14,7 +14,6 @@ from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver
 from walkerlab.physics.kernels import vector
 from walkerlab.physics.mechanics.tree import projections
-from walkerlab.physics.solvers.events import shift_column
 from walkerlab.physics.solvers.scipy_methods import right_hand_side
 from walkerlab.physics.solvers.stepping import T
 from walkerlab.physics.solvers.system import Floats
@@ -56,8 +55,8 @@ def change_form(
         if event != events.PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)
-        for column, wait in zip(columns.T, waits, strict=True):
-            shift_column(column, 0, rate, wait)
+        # saltation: shift the columns from fixed time to the time of the event
+        columns += np.outer(rate, waits)
     if events.EXTENSION <= event < events.PULSE_END:
         x, lost, columns = lock_knee(whole, after.form, x, columns)
         observer.account[KNEE_STRIKES] += lost
@@ -65,9 +64,7 @@ def change_form(
     if waits.size > 0:
         starts_push = ends_step and before.form.push_off != 0.0
         rate_after = np.zeros(size) if starts_push else state_rate(after, z, size, t)
-        for column, wait in zip(columns.T, waits, strict=True):
-            shift_column(column, 0, rate_after, -wait)
-        Phi[: z.size] = forms.to_form(after.form, columns)
+        Phi[: z.size] = forms.to_form(after.form, columns - np.outer(rate_after, waits))
     return z
 
 

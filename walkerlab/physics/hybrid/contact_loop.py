@@ -74,9 +74,8 @@ def walk_in_form(
     while steps_are_left(walk_state, until):
         status = stepping.advance(method, system, search.target)
         if status != stepping.STEP_DONE:
-            return (
-                endings.BUDGET_EXHAUSTED if status == stepping.OUT_OF_BUDGET else endings.SOLVER_FAILED
-            ), search.event
+            failure = endings.BUDGET_EXHAUSTED if status == stepping.OUT_OF_BUDGET else endings.SOLVER_FAILED
+            return failure, search.event
         stepping.prepare_dense(method, system)
         stepping.sample(method, system, finder.nodes, finder.states)
         fraction, event = scan(system, walk_state, watch_order, finder)
@@ -87,20 +86,18 @@ def walk_in_form(
         walk_state.progress.passes_switching = False
         observe(observer, method, system, finder, walk_state)
         note_flexion(system.form, walk_state, method.y)
-        outcome = judge(system, walk_state, method.clock[stepping.T])
+        t = method.clock[stepping.T]
+        outcome = judge(system, walk_state, t)
         if outcome == endings.GOES_ON:
-            forget_zeros(walk_state, method.clock[stepping.T] - method.clock[stepping.T_OLD])
+            forget_zeros(walk_state, t - method.clock[stepping.T_OLD])
             if search.occurs:
                 outcome = react(system, observer, walk_state, method, search.event, until)
         if outcome != endings.GOES_ON:
             return outcome, search.event
-        if (
-            walk_state.progress.release == events.AT_PULSE_END
-            and pulse_left(system, method.clock[stepping.T]) <= EVENT_TIME
-        ):
+        if walk_state.progress.release == events.AT_PULSE_END and pulse_left(system, t) <= EVENT_TIME:
             release(walk_state, 1 - walk_state.progress.stance)
             return endings.CHANGES_FORM, events.PULSE_END
-        search = seek(deadline(system, walk_state, method.clock[stepping.T]), search.event)
+        search = seek(deadline(system, walk_state, t), search.event)
     return endings.WALKED, search.event
 
 

@@ -12,29 +12,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics import energy_channels as channels
+from walkerlab.physics import kernels
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies, hinge_powers
 from walkerlab.physics.ground.walker import STATE_VECTOR, OnGround, one_foot_motion, relative_to_ground, store_whole
 from walkerlab.physics.hybrid.contact_state import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY, WalkState
 from walkerlab.physics.hybrid.walk_record import torque_work
-from walkerlab.physics.kernels import (
-    dispatch_by_type_or_default,
-    kernel,
-    kernel_part,
-    matrix,
-    pass_by_reference,
-    vector,
-)
+from walkerlab.physics.kernels import kernel, kernel_part, matrix, pass_by_reference, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.tree import fast_fields, record_type
 from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
 from walkerlab.physics.solvers.linear import factor, solve
-from walkerlab.physics.solvers.radau5 import RADAU_NODES, Radau5
+from walkerlab.physics.solvers.radau5 import RADAU_NODES, ROOT6, Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
 from walkerlab.physics.solvers.system import jacobian
 
 SIDE_OFFSET = 4e-12  # s, a few times the uncertainty of event times
-ROOT6 = 6.0**0.5
 # coefficients of Radau IIA: Hairer and Wanner II, (5.6)
 RADAU_WEIGHTS = np.array(
     [
@@ -60,13 +53,8 @@ class Tangent(NamedTuple):
 
 def new_tangent(n: int, directions: int) -> Tangent:
     m = n if directions else 0
-    return Tangent(
-        np.zeros((n, directions)),
-        np.zeros((4, m, m)),
-        np.zeros((3 * m, 3 * m)),
-        np.zeros(3 * m, np.int64),
-        np.zeros(3 * m),
-    )
+    Phi, stages, system = map(np.zeros, ((n, directions), (4, m, m), (3 * m, 3 * m)))
+    return Tangent(Phi, stages, system, pivots=np.zeros(3 * m, np.int64), rates=np.zeros(3 * m))
 
 
 @kernel_part
@@ -88,9 +76,8 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
             for row in range(n):
                 for column in range(n):
                     same = 1.0 if i == j and row == column else 0.0
-                    tangent.system[i * n + row, j * n + column] = (
-                        same - h * RADAU_WEIGHTS[i, j] * tangent.stages[i, row, column]
-                    )
+                    slope = h * RADAU_WEIGHTS[i, j] * tangent.stages[i, row, column]
+                    tangent.system[i * n + row, j * n + column] = same - slope
     factor(tangent.system, tangent.pivots, 3 * n)
     for direction in range(tangent.Phi.shape[1]):
         carry_direction(tangent, n, direction, h)
@@ -283,7 +270,7 @@ def end_energy(system: OnGround, y: Any) -> float:
     return total_energy(system, y)
 
 
-@dispatch_by_type_or_default
+@kernels.dispatch_by_type_or_default
 def quadrature(method: Any) -> Quadrature:
     """Return the quadrature rule for powers over a method's step, as accurate as the best dense output."""
     return RADAU_ORDER_9

@@ -18,13 +18,7 @@ from walkerlab.physics.hybrid.contact_crossings import hip_height
 from walkerlab.physics.hybrid.contact_jumps import change_form
 from walkerlab.physics.hybrid.contact_loop import AT_LIFT, NO_LIMIT, walk_in_form
 from walkerlab.physics.hybrid.contact_record import CONTACT_TALLY, ContactObserver, ContactSamples, new_tangent
-from walkerlab.physics.hybrid.contact_state import (
-    JudgedGround,
-    WalkState,
-    material_along,
-    new_walk_state,
-    steps_with_lift,
-)
+from walkerlab.physics.hybrid.contact_state import JudgedGround, WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.endings import CHANGES_FORM, FALLEN_HIP
 from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import kernel, uncompiled, vector
@@ -237,8 +231,7 @@ def walk_contact(
     A start whose hip is already too low is rejected.
     """
     frame = ground.frame
-    s = vector(BODY_VECTOR)
-    c = vector(BODY_VECTOR)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     forms.sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground, stance, steps, start)
@@ -332,20 +325,17 @@ def gather(
     stopped: Stopped, walk_state: WalkState, observer: ContactObserver, walker: ContactWalker, tolerances: Tolerances
 ) -> ContactWalkResult:
     done = int(walk_state.progress.steps)
-    lifted = steps_with_lift(walk_state)
+    lifted = events.steps_with_lift(walk_state)
     seen = int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]
-    along, up = (
-        (float(walk_state.touch_along[done - 1]), float(walk_state.touch_height[done - 1])) if done else (0.0, 0.0)
-    )
-    strike_times = np.where(strikes < 0.0, np.nan, strikes)
+    along, up = (float(each[done - 1]) if done else 0.0 for each in (walk_state.touch_along, walk_state.touch_height))
     return ContactWalkResult(
         foothold_height_m=walk_state.touch_height[:done] if is_uneven(walk_state.ground.terrain) else None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],
-        knee_strike_time_s=strike_times if walker.kneed else None,
+        knee_strike_time_s=np.where(strikes < 0.0, np.nan, strikes) if walker.kneed else None,
         end_time_s=stopped.time_s,
         work=WalkWork(*stopped.work.tolist()),
         slip_m=walk_state.slip[:lifted],

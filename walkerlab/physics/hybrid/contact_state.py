@@ -104,6 +104,10 @@ class WalkState(NamedTuple):
     progress: WalkProgress
 
 
+# fields of a `WalkState` with a value for each step
+STEP_FIELDS = ("touch_time", "touch_along", "touch_height", "slip", "rolling", "lift_time")
+
+
 def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, steps: int, y: State) -> WalkState:
     feet = forms.feet_motion(walker.whole, y)
     terrain = ground.terrain
@@ -118,12 +122,7 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
         has_ground[foot] = on_pad and (starts_with_ground(terrain, foot == stance) or coming_down)
     return WalkState(
         ground=ground,
-        touch_time=np.zeros(steps),
-        touch_along=np.zeros(steps),
-        touch_height=np.zeros(steps),
-        slip=np.zeros(steps),
-        rolling=np.zeros(steps),
-        lift_time=np.zeros(steps),
+        **{name: np.zeros(steps) for name in STEP_FIELDS},
         has_ground=has_ground,
         level=np.zeros(2),
         cells=cells,

@@ -2,16 +2,11 @@
 
 from typing import Any
 
+from walkerlab.physics.ground import terrain as footholds
 from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import MIN_FLEXION, IdealLock, extension
 from walkerlab.physics.ground.pulse import pulse_left
-from walkerlab.physics.ground.terrain import (
-    foothold_height,
-    has_ground_in_air,
-    has_ground_in_cell,
-    height_of_pad,
-    is_uneven,
-)
+from walkerlab.physics.ground.terrain import foothold_height, has_ground_in_air, has_ground_in_cell
 from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, STOPPING, FootMotion, GroundModel, OnGround
 from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_record import ContactObserver, observe_edge
@@ -67,15 +62,14 @@ def apply_event(
         # From now on the row stands for the same edge of the new cell, one pitch away.
         walk_state.at_zero[event] = 0
         # The edge just crossed is the opposite edge of the new cell, whose event function is therefore zero now.
-        walk_state.at_zero[
-            foot * events.PER_FOOT + (events.LEFT_EDGE if kind == events.RIGHT_EDGE else events.RIGHT_EDGE)
-        ] = 1
+        opposite = events.LEFT_EDGE if kind == events.RIGHT_EDGE else events.RIGHT_EDGE
+        walk_state.at_zero[foot * events.PER_FOOT + opposite] = 1
         walk_state.cells[foot] += 1 if kind == events.RIGHT_EDGE else -1
         if not has_ground_in_cell(walk_state.cells[foot]):
             observe_edge(observer, system, foot, y)
             walk_state.has_ground[foot] = 0
             return GOES_ON
-        pad = height_of_pad(walk_state.ground.terrain, foot, walk_state.cells[foot])
+        pad = footholds.height_of_pad(walk_state.ground.terrain, foot, walk_state.cells[foot])
         set_level(system, observer, walk_state, feet[foot].height, foot, pad, y)
         if is_above(walk_state, foot):
             walk_state.has_ground[foot] = 1
@@ -114,7 +108,7 @@ def set_level(
 def next_foothold_counts(walk_state: WalkState, foot: int) -> bool:
     """Whether the ground under a swing foot must still be set to the height of its next foothold."""
     terrain = walk_state.ground.terrain
-    if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
+    if terrain.has_pads or not footholds.is_uneven(terrain) or foot == walk_state.progress.stance:
         return False
     level = foothold_height(terrain, walk_state.progress.steps + 1)
     return is_ahead(walk_state, foot) and walk_state.level[foot] != level
@@ -192,7 +186,7 @@ def touch(
         return OFF_PAD if away > TRIP * pitch else GOES_ON
     if feet[foot].along - feet[stance].along < STEP_AHEAD * pitch:
         return GOES_ON
-    if not is_straight(form, walk_state, foot):
+    if form.kneed and walk_state.knee[foot] != LOCKED:
         return BENT_KNEE
     step = walk_state.progress.steps
     walk_state.touch_time[step] = t
@@ -243,12 +237,6 @@ def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
 def release(walk_state: WalkState, knee: int) -> None:
     walk_state.progress.release = events.NOT_DUE
     walk_state.knee[knee] = RELEASED
-
-
-@kernel_part
-def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot's leg is straight: it has no knee, or the knee is locked."""
-    return not form.kneed or walk_state.knee[foot] == LOCKED
 
 
 @kernel_part

@@ -82,12 +82,8 @@ def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
     min_force    minimum normal force (N)
     min_impulse  minimum normal impulse in a strike (N s)
     """
-    pulls = []
-    if min_force < 0.0:
-        pulls.append(f"the ground would have to pull with {-min_force:.3g} N")
-    if min_impulse < 0.0:
-        pulls.append(f"the ground would have to pull with {-min_impulse:.3g} N s in a strike")
-    return pulls
+    pulls = ((-min_force, "N"), (-min_impulse, "N s in a strike"))
+    return [f"the ground would have to pull with {pull:.3g} {unit}" for pull, unit in pulls if pull > 0.0]
 
 
 def as_state(values: Any) -> State:
@@ -161,9 +157,7 @@ class Recorder:
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, rigid_walk.EVENTS, len(walker.zero_state))
         # Walks with a method of another library run in Python.
-        self.walk: Callable[..., tuple[int, int]] = (
-            rigid_walk.walk if tolerances.compiled else uncompiled(rigid_walk.walk)
-        )
+        self.walk = rigid_walk.walk if tolerances.compiled else uncompiled(rigid_walk.walk)
         self.numbers = len(walker.zero_state)
         self.kneed = walker.kneed or walker.exchanged.kneed
         self.models = rigid.models_in_turn(walker)
@@ -171,10 +165,8 @@ class Recorder:
         self.tally: RigidTally = self.seen.tally[()]
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
-        self.strikes = [np.zeros(0)]
-        self.before = [no_states]
-        self.after = [no_states]
-        self.knees = [np.zeros(0)]
+        # times of the heel strikes, states before and after them, and times of the knee strikes, block by block
+        self.blocks = [(np.zeros(0), no_states, no_states, np.zeros(0))]
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
@@ -211,10 +203,7 @@ class Recorder:
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != rigid.NO_SHANK else np.nan
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
-            blocks.append(new)
-        if self.kneed:
-            self.knees.append(knees[:taken])
+        self.blocks.append((strikes, before, after, knees[:taken]))
         self.steps += taken
         if taken:
             self.state = as_state(after[-1])
@@ -246,21 +235,18 @@ class Recorder:
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
-        strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
-        steps = np.arange(len(before))
-        lengths = rigid.compute_in_turns(
-            self.walker, steps, rigid.step_lengths, np.vstack((self.start, after))[:-1], before
-        )
+        strikes, before, after, knees = map(np.concatenate, zip(*self.blocks, strict=True))
+        walker = self.walker
+        starts = np.vstack((self.start, after))[:-1]
+        lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
-        gravity = float(self.walker.mass) * float(
-            self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
-        )
-        driven, residual = driven_work(self.walker, self.tally, self.start, before, after, gravity)
+        gravity = float(walker.mass) * float(walker.gravity_along * lengths.sum() - walker.gravity_down * climbed)
+        driven, residual = driven_work(walker, self.tally, self.start, before, after, gravity)
         return RigidWalkResult(
             outcome=outcome,
             touch_time_s=strikes,
             touch_along_m=np.cumsum(lengths),
-            knee_strike_time_s=np.concatenate(self.knees) if self.kneed else None,
+            knee_strike_time_s=knees if self.kneed else None,
             end_time_s=end_time,
             work=WalkWork(*self.counts[:BUDGET].tolist()),
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
@@ -274,8 +260,8 @@ class Recorder:
             min_normal_force=float(self.tally.min_normal_force),
             min_normal_impulse=float(self.tally.min_impulse) if self.steps else None,
             **{name: float(self.tally[name]) for name in MAXIMA},
-            mean_energy=mean_energy(self.walker, self.tally, self.start, strikes, after),
-            samples=join(self.pieces) if self.pieces else None,
+            mean_energy=mean_energy(walker, self.tally, self.start, strikes, after),
+            samples=Samples(*map(np.concatenate, zip(*self.pieces, strict=True))) if self.pieces else None,
         )
 
 
@@ -317,8 +303,7 @@ def driven_work(
     pushed = walker.push_off or walker.exchanged.push_off
     push = float(rigid.compute_in_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
     weight = float(walker.mass * walker.gravity)
-    forward = float(tally.forward_work)
-    return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
+    return DrivenWork(weight, gravity, push, hip, torque, float(tally.forward_work), knees), abs(residual)
 
 
 def elastic_energies(law: SpringDamper, angles: Array) -> Array:
@@ -339,7 +324,3 @@ def are_far_from(times: Array, events: Array, distance: float) -> NDArray[np.boo
     behind = np.searchsorted(events, times).clip(max=events.size - 1)
     before = (behind - 1).clip(min=0)
     return np.asarray(np.minimum(np.abs(times - events[behind]), np.abs(times - events[before])) > distance)
-
-
-def join(pieces: list[Samples]) -> Samples:
-    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))

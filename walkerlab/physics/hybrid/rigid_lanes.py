@@ -239,8 +239,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     accepted = 1.0 - error
     # positive if this solver step uses up the time
     over = TINY_ERROR - (left - h)
-    pendulum_time = walker.pendulum_time
-    stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
+    stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * walker.pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, lanes.load(rows, ARRIVALS))
     # A rejected solver step needs no attention: the lane tries a shorter one next.
     event = lanes.choose(stuck, 1.0, lanes.choose(accepted, lanes.choose(attention, 1.0, 0.0), 0.0))
@@ -315,11 +314,10 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
     rows = memory.rows
     slots = memory.slots
     move_on(memory, lane)
-    pendulum_time = walker.pendulum_time
     rate = rows[START_STATE + 2, lane] + rows[START_STATE + 3, lane]
     guard = feet_on_slope(walker, rows[START_STATE, lane], rows[START_STATE + 1, lane])
     wait = -guard / rate if rate != 0.0 else 0.0
-    if abs(wait) > ARRIVAL_TIME * pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
+    if abs(wait) > ARRIVAL_TIME * walker.pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
         rows[ARRIVALS, lane] += 1.0
         step_before = abs(rows[STEP_BEFORE, lane])
         # The solver step may have gone past the heel strike: the next one then goes back.

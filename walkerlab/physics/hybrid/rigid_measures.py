@@ -40,9 +40,8 @@ def fill_energies(walker: RigidModel, states: Any, out: Any) -> None:
 @kernel
 def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None:
     for i in range(states.shape[0]):
-        out[i, 0], out[i, 1] = rigid_model.ground_reaction(
-            Mode(walker, rigid_model.BENT if bent[i] else rigid_model.STRAIGHT), states[i]
-        )
+        mode = Mode(walker, rigid_model.BENT if bent[i] else rigid_model.STRAIGHT)
+        out[i, 0], out[i, 1] = rigid_model.ground_reaction(mode, states[i])
 
 
 @dataclass(frozen=True)
@@ -89,10 +88,8 @@ def places(
         foot = centre + rotate_levers(psi, model.foot_x, model.foot_y) - [0.0, model.swing_radius]
         # `compute_in_turns` passes either even or odd steps. In odd steps leg 2 swings.
         by_role = knees_m[::-1] if step.size and step[0] % 2 else knees_m
-        knees = [
-            hip + rotate_levers(psi[:, [leg]], [x], [y])
-            for leg, (x, y) in zip((rigid_model.SWING, rigid_model.STANCE), by_role, strict=False)
-        ]
+        legs = zip((rigid_model.SWING, rigid_model.STANCE), by_role, strict=False)
+        knees = [hip + rotate_levers(psi[:, [leg]], [x], [y]) for leg, (x, y) in legs]
         return np.stack((contact, hip, foot, *knees), axis=1)
 
     at = rigid_model.compute_in_turns(walker, step, points, angle, step)

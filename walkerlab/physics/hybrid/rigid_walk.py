@@ -167,15 +167,12 @@ def take_step(
         status = swing_phase(method, system, finder, observer, t, y, latest, step)
         if status != endings.WALKED and status != endings.KNEE_STRUCK:
             return status, method.clock[stepping.T]
-        if (
-            status == endings.WALKED
-            and strikes.nearest > 0.0
-            and rigid.swing_foot(model, method.y)[1] < strikes.nearest
-        ):
+        heel = status == endings.WALKED
+        if heel and strikes.nearest > 0.0 and rigid.swing_foot(model, method.y)[1] < strikes.nearest:
             return endings.FELL, method.clock[stepping.T]
         t = pass_event(method, system, following, y, strikes, step)
-        observe_strike(observer, system, following, status == endings.WALKED, method.y, y)
-        if status == endings.WALKED:
+        observe_strike(observer, system, following, heel, method.y, y)
+        if heel:
             return endings.WALKED, t
         strikes.knee_time[step] = t
         phase = rigid.STRAIGHT
@@ -204,9 +201,7 @@ def swing_phase(
         near = may_end(system, method, at_start)
         if near or observer.watching:
             stepping.prepare_dense(method, system)
-        strike = NO_CROSSING
-        fall = NO_CROSSING
-        knee_strike = NO_CROSSING
+        strike = fall = knee_strike = NO_CROSSING
         if near:
             stepping.sample(method, system, finder.nodes, finder.states)
             strike, fall, knee_strike = events_in_step(system, finder, at_start)
@@ -219,9 +214,8 @@ def swing_phase(
             return endings.BENT_KNEE
         if min(strike, knee_strike) <= 1.0:
             coming = True
-            limit = method.clock[stepping.T_OLD] + min(strike, knee_strike) * (
-                method.clock[stepping.T] - method.clock[stepping.T_OLD]
-            )
+            start, end = method.clock[stepping.T_OLD], method.clock[stepping.T]
+            limit = start + min(strike, knee_strike) * (end - start)
             stepping.rewind(method, system)
         at_start = False
     if not coming:

@@ -13,15 +13,8 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Final, NamedTuple
 
-from walkerlab.physics.kernels import (
-    ALWAYS_INLINE_FLAGS,
-    LawKind,
-    classes_named_by,
-    compile_as,
-    dispatch_by_type_or_default,
-    forced_inline,
-    kernel_part,
-)
+from walkerlab.physics import kernels
+from walkerlab.physics.kernels import LawKind, compile_as, dispatch_by_type_or_default, forced_inline, kernel_part
 
 
 @dispatch_by_type_or_default
@@ -90,7 +83,7 @@ HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, No
 
 def law_named_by(fields: Iterable[str]) -> Any:
     """Return the hinge law named by one of a record type's fields, or SpringDamper if none names a law."""
-    return next(classes_named_by(fields), SpringDamper)
+    return next(kernels.classes_named_by(fields), SpringDamper)
 
 
 @cache
@@ -103,7 +96,7 @@ def hinge_law(model: Any, row: int) -> SpringDamper:
     return law_reader(law_named_by(model.dtype.names))(model, row)
 
 
-compile_as(hinge_law, lambda model, _: (law_reader(law_named_by(model.fields)), ALWAYS_INLINE_FLAGS))
+compile_as(hinge_law, lambda model, _: (law_reader(law_named_by(model.fields)), kernels.ALWAYS_INLINE_FLAGS))
 
 
 @forced_inline

@@ -36,17 +36,10 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     R = model.radius
     R_before = before.radius
     E = model.E[phase]
-    s = vector(like)
-    c = vector(like)
-    F = vector(like)
-    U = vector(like)
-    foot_F = vector(like)
-    foot_U = vector(like)
-    p = vector(like)
-    jump = vector(like)
-    turned = vector(like)
-    M = matrix(like)
-    factors = matrix(like)
+    s, c, F, U = vector(like), vector(like), vector(like), vector(like)
+    foot_F, foot_U = vector(like), vector(like)
+    p, jump, turned = vector(like), vector(like), vector(like)
+    M, factors = matrix(like), matrix(like)
     sines_cosines(before, n, y, s, c)
     projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
     # Velocity of the new stance foot's centre, along the slope and normal to it. The old foot's centre moves at -R
@@ -125,8 +118,7 @@ def lock(
     n = len(omega)
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
-    changes = np.zeros(rates.shape)
-    turned = np.zeros(rates.shape)
+    changes, turned = np.zeros((2, *rates.shape))
     sines_cosines(tree, n, angles, s, c)
     add_inertia(tree, n, s, c, omega, M, p)
     factors = M.copy()
@@ -190,12 +182,10 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     # The trailing leg carries no other body. Its constants about the hip are those with which it swings next.
     following = model.exchanged
     leg = [rigid.SWING] if following.shank == rigid.NO_SHANK else [rigid.SWING, int(following.shank)]
-    inertia_leg = following.A[np.ix_(leg, leg)].sum()
-    moment_x = following.arm_x[leg].sum()
-    moment_y = following.arm_y[leg].sum()
     for pairs in (A, B):
         pairs[rigid.STANCE, :], pairs[:, rigid.STANCE] = 0.0, 0.0
-    A[rigid.STANCE, rigid.STANCE], arm_x[rigid.STANCE], arm_y[rigid.STANCE] = inertia_leg, moment_x, moment_y
+    A[rigid.STANCE, rigid.STANCE] = following.A[np.ix_(leg, leg)].sum()
+    arm_x[rigid.STANCE], arm_y[rigid.STANCE] = following.arm_x[leg].sum(), following.arm_y[leg].sum()
     psi = before[:, :n] + model.slope
     s = np.sin(psi)
     c = np.cos(psi)
@@ -216,11 +206,8 @@ def push_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64
     n = len(model.arm_x)
     new = np.array(y, float)
     E = model.E[rigid.BENT if model.kneed else rigid.STRAIGHT]
-    s, c, F, U, p = np.zeros((5, n))
-    M = np.zeros((n, n))
-    rigid.equations(model, new, s, c, F, U, M, p)
-    # `equations` has filled p with torques, which do nothing in an instant.
-    p[:] = 0.0
+    M = rigid.mass_matrix(model, new)
+    p = np.zeros(n)
     # A forward impulse above the foothold turns the stance leg clockwise.
     p[rigid.STANCE] = -impulse * rigid.hip_height(model, new)
     factor_linked(E, n, M)

@@ -56,6 +56,10 @@ class Revolute:
     child: str
     child_point_m: Position
 
+    def both_ways(self) -> "tuple[Revolute, Revolute]":
+        """Return the hinge, and the same hinge with its bodies exchanged."""
+        return self, Revolute(self.name, self.child, self.child_point_m, self.parent, self.parent_point_m)
+
 
 @dataclass(frozen=True)
 class BallFoot:
@@ -129,12 +133,8 @@ class Assembly:
 
     def hinge(self, body: str, other: str) -> Revolute | None:
         """Return the hinge between two bodies, with the first as the parent, or None if there is no such hinge."""
-        for joint in self.joints:
-            if (joint.parent, joint.child) == (body, other):
-                return joint
-            if (joint.child, joint.parent) == (body, other):
-                return Revolute(joint.name, body, joint.child_point_m, other, joint.parent_point_m)
-        return None
+        hinges = (hinge for joint in self.joints for hinge in joint.both_ways())
+        return next((hinge for hinge in hinges if (hinge.parent, hinge.child) == (body, other)), None)
 
 
 class Tree(NamedTuple):
@@ -206,10 +206,9 @@ def path(assembly: Assembly, start: str, goal: str) -> list[tuple[str, Position,
 def neighbours(assembly: Assembly, body: str) -> Iterator[tuple[str, Position, Position]]:
     """Yield each body that is hinged to `body`, with the hinge's point on `body` and on the neighbour."""
     for joint in assembly.joints:
-        if joint.parent == body:
-            yield joint.child, joint.parent_point_m, joint.child_point_m
-        if joint.child == body:
-            yield joint.parent, joint.child_point_m, joint.parent_point_m
+        for hinge in joint.both_ways():
+            if hinge.parent == body:
+                yield hinge.child, hinge.parent_point_m, hinge.child_point_m
 
 
 def masses(assembly: Assembly) -> Iterator[tuple[float, Anchor]]:
@@ -226,8 +225,7 @@ def total_mass(assembly: Assembly) -> float:
 
 def tree_about(assembly: Assembly, root: Anchor) -> Tree:
     """Compute the constants of the equations of motion about a point of a body."""
-    mass_levers = [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)]
-    return sum_masses(assembly, mass_levers)
+    return sum_masses(assembly, [(mass, levers(assembly, root, at)) for mass, at in masses(assembly)])
 
 
 def tree_about_centre(assembly: Assembly) -> tuple[Tree, tuple[Floats, ...]]:

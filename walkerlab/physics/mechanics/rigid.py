@@ -21,7 +21,6 @@ class BodyGroups:
     names: tuple[str, ...]  # names of the angles, without the prefix 'theta_'
     members: Floats  # (bodies, n) 1 where an assembly's body is part of a model's body, otherwise 0
     roles: tuple[int, ...]  # body k after a heel strike is body roles[k] before it
-    knees: tuple[tuple[int, int], ...]  # indices (shank, thigh) of the swing knee; empty for straight legs
     lower: int  # number of bodies of the swing leg below its uppermost one; for unequal legs, the larger number
 
 
@@ -72,7 +71,9 @@ def build_first_leg_model(
     members = groups.members
     # Each body belongs to one group, whose index is that of the only 1 in its row.
     coupled = {int(np.argmax(members[body])): row @ members for body, row in parts.followers(assembly).items()}
-    knees = {shank: np.eye(n)[thigh] for shank, thigh in groups.knees}
+    # a leg has at most one knee, and the shank's group follows those of the legs
+    shank, thigh = (2, SWING) if len(assembly.legs[0]) > 1 else (NO_SHANK, NO_SHANK)
+    knees = {} if shank == NO_SHANK else {shank: np.eye(n)[thigh]}
     # If only the other leg has a knee, this leg still has an index for a shank, which stays in line with the leg.
     coupled |= {body: np.eye(n)[SWING] for body in range(n) if not members[:, body].any()}
     # If the trailing knee is free in the strike, its rate afterwards does not follow from the others and is a
@@ -82,7 +83,6 @@ def build_first_leg_model(
     in_line = {**coupled, **knees}
     # in the order BENT, STRAIGHT, AT_STRIKE
     reductions = [parts.reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
-    shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
     return rigid_model.new_rigid_model(
         n,
         law,
@@ -122,18 +122,12 @@ def group_bodies(assembly: parts.Assembly) -> BodyGroups:
         for name in group:
             members[assembly.index(name), index] = 1.0
     longer = max(swinging, stance, key=len)
-    knee_position = {knee.shank: knee.thigh for knee in assembly.knees}
     return BodyGroups(
         names=("1", "2", *(f"1_{name.split()[0]}" for name in longer[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
-        knees=tuple((2 + k, group_index(groups, knee_position[name])) for k, name in enumerate(swinging[1:])),
         lower=more,
     )
-
-
-def group_index(groups: list[tuple[str, ...]], name: str) -> int:
-    return next(index for index, group in enumerate(groups) if name in group)
 
 
 def find_hip(assembly: parts.Assembly) -> parts.Revolute:

@@ -107,8 +107,7 @@ def replace_fields(model: Any, fields: Any) -> RigidModel:
     memory[()] = model
     tree.write_fields(memory, fields)
     memory.flags.writeable = False
-    read_only: RigidModel = memory[()]
-    return read_only
+    return cast(RigidModel, memory[()])
 
 
 def pair(first: RigidModel, second: RigidModel) -> RigidModel:
@@ -157,8 +156,7 @@ def new_rigid_model(n: int, law: type[hinges.SpringDamper], **fields: Any) -> Ri
         "section": (n + 1,),
         "zero_state": (2 * n,),
     }
-    blank: Any = np.zeros((), tree.record_type(RigidModel, shapes, law))
-    model: RigidModel = blank[()]
+    model: RigidModel = tree.new_record(tree.record_type(RigidModel, shapes, law))
     return model.changed(**fields)
 
 
@@ -255,20 +253,15 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     like = model.arm_x
     E = model.E[system.phase]
     n = len(like)
-    s = vector(like)
-    c = vector(like)
-    F = vector(like)
-    U = vector(like)
-    alpha = vector(like)
-    M = matrix(like)
+    s, c, F, U = vector(like), vector(like), vector(like), vector(like)
+    alpha, M = vector(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
     tree.factor_linked(E, n, M)
     tree.solve_linked(E, n, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
-        by_angle = matrix(like)
-        by_rate = matrix(like)
+        by_angle, by_rate = matrix(like), matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
             # The state's alpha is no longer needed. From here on, alpha holds d alpha, the solution of
@@ -288,8 +281,7 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
     """Write the derivatives of r' - M' alpha at fixed alpha into by_angle and by_rate (n, n)."""
     n, R = len(model.arm_x), model.radius
     omega = y[n : 2 * n]
-    F = vector(model.arm_x)
-    U = vector(model.arm_x)
+    F, U = vector(model.arm_x), vector(model.arm_x)
     tree.projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
         for l in range(n):
@@ -316,14 +308,9 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     like = model.arm_x
     E = model.E[system.phase]
     n = len(like)
-    s = vector(like)
-    c = vector(like)
-    F = vector(like)
-    U = vector(like)
-    alpha = vector(like)
-    M = matrix(like)
-    by_angle = matrix(like)
-    by_rate = matrix(like)
+    s, c, F, U = vector(like), vector(like), vector(like), vector(like)
+    alpha, M = vector(like), matrix(like)
+    by_angle, by_rate = matrix(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
     tree.factor_linked(E, n, M)
     tree.solve_linked(E, n, M, alpha)
@@ -379,9 +366,8 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
     for row in range(len(model.hinges)):
-        potential += hinges.hinge_energy(
-            hinges.hinge_law(model, row), y[model.hinges[row, 0]] - y[model.hinges[row, 1]]
-        )
+        apart = y[model.hinges[row, 0]] - y[model.hinges[row, 1]]
+        potential += hinges.hinge_energy(hinges.hinge_law(model, row), apart)
     return tree.kinetic_energy(n, M, y[n : 2 * n]), potential
 
 

@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from walkerlab.physics.kernels import forced_inline
-from walkerlab.physics.mechanics.hinges import HINGE_ROWS, HIP_ROW, LAW_NUMBERS, TORQUE, SpringDamper
+from walkerlab.physics.mechanics.hinges import HINGE_ROWS, LAW_NUMBERS, TORQUE, SpringDamper
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers
 
@@ -83,12 +83,6 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
     gravity_along: float  # m/s^2, downhill
     gravity_down: float  # m/s^2, towards the slope
     slope: float  # [phi] rad, positive if the walker walks downhill
-
-    @property
-    def hip(self) -> Floats:
-        """Parameters (LAW_NUMBERS,) of the hinge law between the legs."""
-        parameters: Floats = self.laws[HIP_ROW]
-        return parameters
 
     @property
     def sprung(self) -> bool:

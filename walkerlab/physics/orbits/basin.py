@@ -23,7 +23,7 @@ from walkerlab.physics.solvers.system import Floats, Integers
 
 # tolerances of walks in a basin, which cause errors of 1e-7 per step
 RTOL, ATOL = 1e-6, 1e-8
-CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # tolerances of walks that determine attractors
+CYCLE_TOLERANCES = 1e-11, 1e-13  # rtol and atol of walks that determine attractors
 SECTION_SIZE = 3
 UNREACHED = -1  # attractor index of a walk that reaches no attractor
 MAX_CYCLE_PERIOD = 32  # steps; longer cycles count as aperiodic
@@ -181,7 +181,6 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
 
 def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple[list[Floats], bool]:
     """Return the cycles other than `attractors` that walks settle on, and whether any walk stays aperiodic."""
-    tight = (CYCLE_RTOL, CYCLE_ATOL)
     rough = walk_to_attractor(walker, attractors, starts, SETTLING_STEPS)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == UNREACHED))
     points = rough.last[elsewhere]
@@ -189,7 +188,7 @@ def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple
     _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
     # `np.unique` sorts by value. Sorting the indices restores the order of the starts.
     distinct = points[np.sort(first)][:MAX_SETTLED_WALKS]
-    settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=tight)
+    settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=CYCLE_TOLERANCES)
     cycles: list[Floats] = []
     aperiodic = False
     for point in settled.last[settled.outcome == Outcome.WALKED]:
@@ -213,7 +212,7 @@ def cycle_through(walker: Walker, point: Floats) -> Floats | None:
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
         start = orbit[-1][None, :]
-        ahead = walk_to_attractor(walker, Attractors(), start, stride_of(walker), tolerances=(CYCLE_RTOL, CYCLE_ATOL))
+        ahead = walk_to_attractor(walker, Attractors(), start, stride_of(walker), tolerances=CYCLE_TOLERANCES)
         if ahead.outcome[0] != Outcome.WALKED:
             return None
         orbit.append(ahead.last[0])

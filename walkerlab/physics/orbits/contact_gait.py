@@ -132,9 +132,8 @@ def follow_from_rigid(
     count = len(pitches_m)
 
     def gait_at(rigidity: float, z: Floats, pitches_m: Sequence[float]) -> Cycle | str:
-        return solve_gait_on(
-            AdaptivePads(partial(set_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity
-        )
+        pads = AdaptivePads(partial(set_rigidity, walker), ground, tolerances, *pitches_m)
+        return solve_gait_on(pads, z, count, rigidity)
 
     points = section_points(set_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
@@ -155,9 +154,8 @@ def follow_from_rigid(
         gaits[state] = near
         return append_length(near)
 
-    state = Follower(
-        evaluate_softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES
-    ).follow_to(1.0)
+    first = FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),))
+    state = Follower(evaluate_softer, first, RIGIDITY_STRIDES).follow_to(1.0)
     if state.value == 1.0:
         return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
     rigidity = 1.0 - state.value

@@ -25,6 +25,7 @@ from walkerlab.physics.ground import walker as forms
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.physics.ground.walker import ContactWalker, OnGround
+from walkerlab.physics.hybrid import contact_state as events
 from walkerlab.physics.hybrid.contact_jumps import state_rate
 from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_observer, present_walker, walk_on
@@ -259,10 +260,8 @@ def walk_from_section(
     if push != 0.0:
         # With room for only one touchdown in the record, the walk stops at that touchdown, where the push acts.
         stopped = continue_walk(shorten(walk_state, 1), start)
-        pushed = push_at_hip(
-            forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
-        )
-        stopped = replace(stopped, state=pushed)
+        system = forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee)
+        stopped = replace(stopped, state=push_at_hip(system, walker, stopped.state, push))
     landed = list[float]()
     differ = have_different_soles(walker)
     # If the soles differ, angles do not follow from the footholds. So the walk stops at each touchdown to read them.
@@ -328,9 +327,8 @@ def place_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
-    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling", "lift_time")
     # The shorter arrays are views, so steps are recorded in `walk_state` itself.
-    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
+    return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in events.STEP_FIELDS})
 
 
 def push_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
@@ -361,9 +359,8 @@ def walk_state_on_section(site: WalkerOnGround, start: State, steps: int, stance
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1
     walk_state.sides[PASSING] = 1 if swing == 1 else -1
-    walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
-        site.ground.terrain, bool(walk_state.has_ground[swing]), False, True
-    )
+    carried = has_ground_in_air(site.ground.terrain, bool(walk_state.has_ground[swing]), False, True)
+    walk_state.has_ground[swing] = feet[swing].height > 0.0 and carried
     # The swing foot is above the gap that follows the pad it left.
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
     walk_state.foothold[swing] = feet[stance].along - site.ground.frame.leg_length
@@ -423,10 +420,6 @@ class ContactMap(StepMap):
         self.tolerances = tolerances
         self._on_pads = like.ground.terrain.has_pads
         self._first = first
-        angled = angled_bodies(like.walker, self._stance(0))
-        turning = turning_bodies(like.walker, self._stance(0))
-        rates = (f"rate_{body}" for body in turning)
-        self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
         self._units = [section_units(like, self._stance(swing)) for swing in range(2)]
 
     def _stance(self, swing: int) -> int:
@@ -436,10 +429,8 @@ class ContactMap(StepMap):
         return np.asarray(z / self._units[0])
 
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
-        pitch_m = site.ground.terrain.pitch
-        stance = self._stance(swing)
         z_m = z * self._units[swing % 2]
-        return step_from_section(site, self.tolerances, z_m, pitch_m, derived, stance)
+        return step_from_section(site, self.tolerances, z_m, site.ground.terrain.pitch, derived, self._stance(swing))
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)

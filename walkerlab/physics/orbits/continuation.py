@@ -8,6 +8,7 @@ Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue probl
 applied bifurcation theory, chapter 10.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple
@@ -15,16 +16,8 @@ from typing import Generic, NamedTuple
 import numpy as np
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.orbits.newton import (
-    MAX_NEWTON_EVALUATIONS,
-    Data,
-    Effort,
-    Equations,
-    Evaluated,
-    NotConverged,
-    Solution,
-    newton,
-)
+from walkerlab.physics.orbits import newton
+from walkerlab.physics.orbits.newton import Data, Effort, Equations, Evaluated, NotConverged, Solution
 from walkerlab.physics.solvers.system import Floats
 
 FEW_CORRECTIONS = 3  # the next step is longer if at most this many Newton corrections were needed
@@ -94,12 +87,8 @@ class Follower:
 
 def interpolate(points: Points, x: float) -> Floats:
     total = np.zeros_like(points[0][1])
-    for i, (x_i, y_i) in enumerate(points):
-        weight = 1.0
-        for j, (x_j, _) in enumerate(points):
-            if j != i:
-                weight *= (x - x_j) / (x_i - x_j)
-        total += weight * y_i
+    for x_i, y_i in points:
+        total += math.prod((x - x_j) / (x_i - x_j) for x_j, _ in points if x_j != x_i) * y_i
     return total
 
 
@@ -109,11 +98,7 @@ class CurvePoint(Solution[Data]):
 
 
 def correct(
-    equations: Equations[Data],
-    guess: Floats,
-    normal: Floats,
-    tolerance: float,
-    max_evaluations: int = MAX_NEWTON_EVALUATIONS,
+    equations: Equations[Data], guess: Floats, normal: Floats, effort: Effort
 ) -> CurvePoint[Data] | NotConverged:
     """Solve for the point of a curve on the plane through `guess` with this `normal`."""
 
@@ -122,7 +107,7 @@ def correct(
         value = np.append(evaluated.value, normal @ (x - guess))
         return evaluated._replace(value=value, jacobian=np.vstack((evaluated.jacobian, normal)))
 
-    solution = newton(evaluate_on_plane, guess, Effort(tolerance, max_evaluations))
+    solution = newton.newton(evaluate_on_plane, guess, effort)
     if isinstance(solution, NotConverged):
         return solution
     try:
@@ -161,7 +146,7 @@ def step_along(
         bend = np.asarray((last.tangent - before.tangent) / np.linalg.norm(last.x - before.x))
     while length >= control.shortest:
         guess = last.x + length * last.tangent + 0.5 * length**2 * bend
-        point = correct(equations, guess, last.tangent, control.tolerance)
+        point = correct(equations, guess, last.tangent, Effort(control.tolerance))
         if isinstance(point, CurvePoint):
             correction = float(np.linalg.norm(point.x - guess))
             # A sharp turn or a long correction may lead to another branch.
@@ -191,7 +176,8 @@ class Segment(Generic[Data]):
         share = s / self.length
         bend = self.second.x - self.first.x - self.length * self.first.tangent
         guess = self.first.x + s * self.first.tangent + share * share * bend
-        return correct(self.equations, guess, self.first.tangent, self.tolerance, 2 * MAX_NEWTON_EVALUATIONS)
+        effort = Effort(self.tolerance, 2 * newton.MAX_NEWTON_EVALUATIONS)
+        return correct(self.equations, guess, self.first.tangent, effort)
 
 
 class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an error)

@@ -13,16 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
-from walkerlab.physics.orbits.bifurcations import (
-    BIFURCATION_KINDS,
-    Bifurcation,
-    FlipForm,
-    GaitEquations,
-    critical_value,
-    flip_form,
-    locate_bifurcation,
-    predict_doubled,
-)
+from walkerlab.physics.orbits import bifurcations
+from walkerlab.physics.orbits.bifurcations import BIFURCATION_KINDS, Bifurcation, GaitEquations, locate_bifurcation
 from walkerlab.physics.orbits.continuation import CurvePoint, Segment, StepControl, correct, step_along
 from walkerlab.physics.orbits.newton import Effort, NotConverged
 from walkerlab.physics.orbits.step_map import Cycle, Monitor, StepMap, gait_near
@@ -132,7 +124,7 @@ class GaitBranch:
     def flipped_outside(self) -> bool:
         """Whether a multiplier is below -1 along the whole branch, because the flip lies outside the span."""
         on_it = any(bifurcation.kind == "flip" for bifurcation in self.bifurcations)
-        return not on_it and critical_value("flip", self.points[0].DP) < 0.0
+        return not on_it and bifurcations.critical_value("flip", self.points[0].DP) < 0.0
 
 
 class Seed(NamedTuple):
@@ -158,8 +150,8 @@ class BranchTracer:
 
     def solve_at(self, z: Floats, value: float, period: int) -> CurvePoint[Cycle] | None:
         x = np.append(z, value / self.span.size)
-        tolerance = self.control.tolerance
-        solution = correct(self.equations(period), x, np.eye(x.size)[-1], tolerance, SEED_EVALUATIONS)
+        effort = Effort(self.control.tolerance, SEED_EVALUATIONS)
+        solution = correct(self.equations(period), x, np.eye(x.size)[-1], effort)
         return None if isinstance(solution, NotConverged) else solution
 
     def trace(self, start: CurvePoint[Cycle], period: int) -> GaitBranch:
@@ -168,7 +160,7 @@ class BranchTracer:
         before = None
         last = start
         end = None
-        bifurcations = list[Bifurcation]()
+        located = list[Bifurcation]()
         crossings = list[Crossing]()
         step = self.control.first
         # Just beyond a flip, a long step could lead to the same cycle with its halves exchanged.
@@ -191,8 +183,8 @@ class BranchTracer:
                 end = BranchEnd(points[-1].value, f"closes on the gait of {half} {steps_word(half)}", closes=True)
                 break
             segment = Segment(equations, last, solved, self.control.tolerance)
-            located = (locate_bifurcation(segment, kind, equations.scale) for kind in BIFURCATION_KINDS)
-            bifurcations += [bifurcation for bifurcation in located if bifurcation is not None]
+            tested = (locate_bifurcation(segment, kind, equations.scale) for kind in BIFURCATION_KINDS)
+            located += [bifurcation for bifurcation in tested if bifurcation is not None]
             points.append(self.point(solved))
             left, right = points[-2:]
             for monitor, ahead, after in zip(self.step_map.monitors, left.monitors, right.monitors, strict=True):
@@ -209,7 +201,7 @@ class BranchTracer:
             points = [*points[begin:-1], *points[: begin + 1]]
             end = replace(end, value=points[0].value)
         first = BranchEnd(points[0].value, end.reason if end.reason == CLOSED_LOOP else "start")
-        return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
+        return GaitBranch(period, tuple(points), (first, end), tuple(located), tuple(crossings))
 
     def check_after(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
         """Return a test of the next point: multipliers near the unit circle must change little, and the gait must not
@@ -277,7 +269,7 @@ class BranchTracer:
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
         guess[-1] = edge / self.span.size
-        point = correct(equations, guess, np.eye(guess.size)[-1], self.control.tolerance)
+        point = correct(equations, guess, np.eye(guess.size)[-1], Effort(self.control.tolerance))
         if isinstance(point, NotConverged):
             return None
         return point if point.tangent @ last.tangent > 0.0 else replace(point, tangent=-point.tangent)
@@ -348,7 +340,7 @@ class BranchFollower(BranchTracer):
             like = [branch for branch in (*previous, *branches) if branch.period == 2 * parent.period]
             if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
                 continue
-            form = flip_form(self.equations(parent.period), flip)
+            form = bifurcations.flip_form(self.equations(parent.period), flip)
             start = None if form is None else self.enter_doubled(flip, form, parent.period)
             if start is not None:
                 branch = self.trace(start, 2 * parent.period)
@@ -357,15 +349,15 @@ class BranchFollower(BranchTracer):
                     branches.append(replace(branch, ends=(first, branch.ends[1])))
         return branches
 
-    def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
+    def enter_doubled(self, flip: Bifurcation, form: bifurcations.FlipForm, period: int) -> CurvePoint[Cycle] | None:
         """Return the first gait of twice the period, at the amplitude of the normal form or at a fraction of it.
 
         Returns None if Newton's method finds no such gait.
         """
         # The tangent must point away from the flip, so the halves of the cycle must move apart along it.
         for halving in range(AMPLITUDE_HALVINGS):
-            guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
-            point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
+            guess, normal, xi = bifurcations.predict_doubled(flip, form, 0.5**halving)
+            point = correct(self.equations(2 * period), guess, normal, Effort(self.control.tolerance))
             # A correction as large as the amplitude may have led back to the gait of the single period.
             if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
                 half = self.equations(period)(point.x)

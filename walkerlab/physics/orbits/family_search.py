@@ -7,17 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from walkerlab.physics.orbits import two_parameters
-from walkerlab.physics.orbits.attractors import (
-    Attractor,
-    AttractorBranch,
-    Lyapunov,
-    close_returns,
-    largest_exponent,
-    leave_by_flip,
-    settle_elsewhere,
-    sweep_attractor,
-)
+from walkerlab.physics.orbits import attractors, two_parameters
+from walkerlab.physics.orbits.attractors import Attractor, AttractorBranch, Lyapunov, largest_exponent, settle_elsewhere
 from walkerlab.physics.orbits.continuation import StepControl
 from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.physics.orbits.step_map import StepMap
@@ -163,22 +154,21 @@ class FamilySearch:
             end = span.most if begin - span.least < span.most - begin else span.least
         values = np.linspace(begin, end, how.values)
         self.announce("attractor of {model}", how.values)
-        attractors = sweep_attractor(self.step_map, start, values, how.transient, how.samples, self.listener.advance)
-        if not attractors.found:
-            return replace(family, attractors=attractors)
+        advance = self.listener.advance
+        swept = attractors.sweep_attractor(self.step_map, start, values, how.transient, how.samples, advance)
+        if not swept.found:
+            return replace(family, attractors=swept)
         # Attractors are listed in order of increasing parameter value.
         if end < begin:
-            attractors = replace(attractors, found=attractors.found[::-1])
-        chosen = attractors.found[:: max(1, len(attractors.found) // how.exponents)]
+            swept = replace(swept, found=swept.found[::-1])
+        chosen = swept.found[:: max(1, len(swept.found) // how.exponents)]
         self.announce("Lyapunov exponents of {model}", len(chosen))
         exponents = []
         for attractor in chosen:
-            exponents.append(
-                largest_exponent(self.step_map, attractor.last, attractor.value, how.samples, how.averaged)
-            )
-            self.listener.advance()
-        measured = tuple(exponent for exponent in exponents if exponent is not None)
-        return replace(family, attractors=attractors, exponents=measured)
+            exponent = largest_exponent(self.step_map, attractor.last, attractor.value, how.samples, how.averaged)
+            exponents += [] if exponent is None else [exponent]
+            advance()
+        return replace(family, attractors=swept, exponents=tuple(exponents))
 
     def add_doubled_gaits(self, family: Family) -> tuple[Family, Attractor | None]:
         """Return the family with gaits of 2, 4, 8, ... steps beyond flips outside the span, and an attractor.
@@ -193,25 +183,25 @@ class FamilySearch:
             branch.points[end] for branch in family.branches if branch.period == 1 and branch.flipped_outside
             for end in (0, -1)
         ]  # fmt: skip
-        reached = [leave_by_flip(self.step_map, end, how.transient, how.samples) for end in ends]
-        attractors = [attractor for attractor in reached if isinstance(attractor, Attractor) and attractor.period != 1]
-        if not attractors:
+        reached = [attractors.leave_by_flip(self.step_map, end, how.transient, how.samples) for end in ends]
+        doubled = [attractor for attractor in reached if isinstance(attractor, Attractor) and attractor.period != 1]
+        if not doubled:
             return family, None
         doublings = [2**k for k in range(1, self.periods.bit_length())]
-        seeds = [seed for a in attractors for seed in close_returns(self.step_map, a, doublings, how.averaged)]
+        seeds = [seed for a in doubled for seed in attractors.close_returns(self.step_map, a, doublings, how.averaged)]
         branches = self.follower.family(seeds, self.periods, family.branches)
-        return replace(family, branches=branches), min(attractors, key=lambda attractor: attractor.value)
+        return replace(family, branches=branches), min(doubled, key=lambda attractor: attractor.value)
 
     def add_other_gaits(self, family: Family, generator: np.random.Generator) -> Family:
         sampled = []
         for chaotic in (False, True):
-            attractors = [attractor for attractor in family.attractors.found if (attractor.period == 0) is chaotic]
-            sampled += attractors[:: max(1, len(attractors) // OTHER_GAIT_VALUES)]
+            alike = [attractor for attractor in family.attractors.found if (attractor.period == 0) is chaotic]
+            sampled += alike[:: max(1, len(alike) // OTHER_GAIT_VALUES)]
         self.announce("other gaits of {model}", len(sampled))
         seeds: list[Seed] = []
         for attractor in sampled:
             if attractor.period == 0:
-                seeds += close_returns(self.step_map, attractor, OTHER_PERIODS, CLOSE_RETURN_STEPS)
+                seeds += attractors.close_returns(self.step_map, attractor, OTHER_PERIODS, CLOSE_RETURN_STEPS)
             seeds += settle_elsewhere(self.step_map, attractor, SCATTERED, SCATTER_WIDTH, SCATTER_STEPS, generator)
             self.listener.advance()
         self.announce("branches of other gaits of {model}")

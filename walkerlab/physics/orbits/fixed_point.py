@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.physics.hybrid.recorded_walk import describe_pulls, take_walk
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING
@@ -19,7 +18,7 @@ from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits import rigid_map
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.physics.orbits.newton import Effort, NotConverged
-from walkerlab.physics.orbits.similarity import HIPS, Units, unit_walker
+from walkerlab.physics.orbits.similarity import LENGTHS, Units, unit_walker
 from walkerlab.physics.orbits.small_slope import SmallSlopeSeed, seeds
 from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near, sort_multipliers
 from walkerlab.physics.solvers.registry import Tolerances
@@ -128,10 +127,6 @@ def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
 
 
-def select_straight(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
-    return swing[~bent]
-
-
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
     """Walk the steps of a gait of the unit walker and measure them in SI units. Return None if a step fails."""
     start = rigid_map.state_on_section(walker, gait.z)
@@ -143,24 +138,18 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
     swings = [step.samples.state[step.samples.step == k] for k in range(count)]
     bent = [step.samples.bent[step.samples.step == k] for k in range(count)]
     apart = [swing[:, rigid.SWING] - swing[:, rigid.STANCE] for swing in swings]
-    rates = [
-        rigid.swing_foot_motion(model, y[0], y[0, y.shape[1] // 2 :])[2]
-        for model, y in zip(models, swings, strict=True)
-    ]
-    rate = 1.0 / units.time
     n = len(start) // 2
-    multipliers = gait.multipliers
-    sizes = [
-        (float(period) * units.time, float(length) * units.length)
-        for period, length in zip(step.periods_s, step.lengths_m, strict=True)
-    ]
+    rates = [rigid.swing_foot_motion(model, y[0], y[0, n:])[2] for model, y in zip(models, swings, strict=True)]
+    rate = 1.0 / units.time
+    periods = (step.periods_s * units.time).tolist()
+    lengths = (step.lengths_m * units.length).tolist()
     return RigidGait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
-        period=math.fsum(period for period, _ in sizes) / count,
-        step_length=math.fsum(length for _, length in sizes) / count,
-        multipliers=tuple(multipliers.tolist()) if count == 1 else (),
-        stride_multipliers=tuple(sort_multipliers(multipliers ** (STRIDE // count)).tolist()),
-        steps=tuple(sizes * (STRIDE // count)),
+        period=math.fsum(periods) / count,
+        step_length=math.fsum(lengths) / count,
+        multipliers=tuple(gait.multipliers.tolist()) if count == 1 else (),
+        stride_multipliers=tuple(sort_multipliers(gait.multipliers ** (STRIDE // count)).tolist()),
+        steps=tuple(zip(periods, lengths, strict=True)) * (STRIDE // count),
         residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
         energy=step.mean_energy * units.energy,
         energy_drift=step.energy_drift * units.energy,
@@ -174,7 +163,7 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m.sum())),
         froude=float(step.lengths_m.sum() / step.periods_s.sum()),
         swings=max(int(np.count_nonzero(np.diff(np.signbit(each)))) for each in apart),
-        feet_meet=any(feet_meet(*each) for each in zip(models, map(select_straight, swings, bent), strict=True)),
+        feet_meet=any(feet_meet(model, y[~free]) for model, y, free in zip(models, swings, bent, strict=True)),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
         z=tuple(gait.z.tolist()),
     )
@@ -240,20 +229,7 @@ NO_SEED_TEXT = {
 MAX_DRIVE_POINTS = 60
 STRIDE = 2  # steps
 # fields of a model that depend on its legs
-LEG_FIELDS = (
-    "A",
-    "B",
-    "arm_x",
-    "arm_y",
-    "foot_x",
-    "foot_y",
-    "laws",
-    "push_off",
-    "radius",
-    "swing_radius",
-    "lean",
-    *HIPS,
-)
+LEG_FIELDS = ("A", "B", "arm_x", "arm_y", "laws", "push_off", "lean", *LENGTHS)
 DIFFERENCE_STRIDES = Strides(0.25, 1e-3, 3)
 MAX_DIFFERENCE_JUMP = 0.05  # distance from the prediction; beyond it the gait belongs to another branch
 
@@ -342,16 +318,13 @@ def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> rigid_map.Rigi
 def average_legs(walker: RigidModel, share: float) -> RigidModel:
     """Return the walker with only the fraction `share` of the difference between its legs. At 0 the legs are equal."""
     # The constants of both models enter the equations linearly, so every mean of them is a valid walker.
-    models = walker, walker.exchanged
 
-    def blend_models(k: int) -> RigidModel:
-        model = models[k]
-        other = models[1 - k]
+    def blend(model: RigidModel, other: RigidModel) -> RigidModel:
         parts = {name: 0.5 * ((1.0 + share) * model[name] + (1.0 - share) * other[name]) for name in LEG_FIELDS}
-        alike = walker.alike or share == 0.0
-        return rigid.replace_fields(model, {**parts, "alike": alike})
+        return rigid.replace_fields(model, {**parts, "alike": walker.alike or share == 0.0})
 
-    return blend_models(0) if share == 0.0 else rigid.pair(blend_models(0), blend_models(1))
+    blended = blend(walker, walker.exchanged)
+    return blended if share == 0.0 else rigid.pair(blended, blend(walker.exchanged, walker))
 
 
 def scale_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
@@ -399,7 +372,6 @@ class Search:
         if goal.shank != goal.exchanged.shank:
             self.lost.append("only one leg has a knee, so there is no walker with two mean legs to start from")
             return
-        even = average_legs(goal, 0.0)
         family = rigid_map.RigidMap(partial(average_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
 
         def gait_at(share: float, expected: Floats) -> Floats | None:
@@ -409,7 +381,7 @@ class Search:
                 return None
             return gait.z
 
-        for k, gait in enumerate(find_gaits(even, seed, settings).gaits):
+        for k, gait in enumerate(find_gaits(average_legs(goal, 0.0), seed, settings).gaits):
             first = FollowerState(0.0, DIFFERENCE_STRIDES.widest, ((0.0, np.array(gait.z)),))
             state = Follower(gait_at, first, DIFFERENCE_STRIDES).follow_to(1.0)
             name = f"gait {k + 1} of the walker with two mean legs"

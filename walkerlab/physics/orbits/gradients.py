@@ -216,9 +216,7 @@ def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) ->
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))
     # A conjugate has the same magnitude everywhere, so it does not count as another multiplier.
-    distinct = [
-        value for value in values if abs(value - values[largest]) > 0.0 and abs(value.conj() - values[largest]) > 0.0
-    ]
+    distinct = [value for value in values if value not in (values[largest], values[largest].conj())]
     meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in distinct)
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")

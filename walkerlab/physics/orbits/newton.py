@@ -76,10 +76,9 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
             remaining = ahead.residual
             # The residual is as small as rounding errors allow, so the better of the two points is the solution.
             if 0.5 * residual <= remaining < np.inf and min(residual, remaining) <= rounding * tolerance:
-                better = remaining < residual
-                return (
-                    Solution(x + share * move, ahead, corrections + 1) if better else Solution(x, current, corrections)
-                )
+                if remaining < residual:
+                    return Solution(x + share * move, ahead, corrections + 1)
+                return Solution(x, current, corrections)
             if remaining < growth * residual or share <= shortest:
                 break
             share *= 0.5

@@ -170,9 +170,8 @@ class Limit:
         if sampled.samples is None or steps == 0 or steps != check.touch_time_s.size:
             return distance
         legs = leg_motion(sampled.samples.states, walker)
-        motion = comparison.add_strike_samples(
-            Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s)
-        )
+        recorded = Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s)
+        motion = comparison.add_strike_samples(recorded)
         phases = np.linspace(0.0, 1.0, comparison.PHASES)
         aligned = comparison.difference_in_phase(motion, self.motion, phases)
         smooth = comparison.smooth_phases(motion, self.motion, phases)

@@ -24,19 +24,9 @@ from walkerlab.physics.kernels import kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics import rigid_model as rigid
 from walkerlab.physics.mechanics.impact import push_at_hip
 from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.orbits import step_map as maps
 from walkerlab.physics.orbits.similarity import Units, unit_walker
-from walkerlab.physics.orbits.step_map import (
-    CACHE_SIZE,
-    NO_TIMES,
-    DisturbedWalk,
-    Iterates,
-    MappedStep,
-    Monitor,
-    StepMap,
-    VariedWalk,
-    failed_step,
-    valid,
-)
+from walkerlab.physics.orbits.step_map import DisturbedWalk, Iterates, MappedStep, Monitor, StepMap, VariedWalk
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.linear import factor, solve
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances, finder_for
@@ -48,7 +38,6 @@ STEP_WALKED = int(Outcome.WALKED)
 # The variational columns are linear and need fewer digits than the state. Scaled down by this, they keep about three
 # digits fewer (with an absolute tolerance of a tenth of the relative one), which halves the number of solver steps.
 TANGENT_SCALE = 2.0**-13
-SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
 EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
@@ -85,7 +74,7 @@ class StrikeSection(NamedTuple):
     curved: RigidModel | None
 
 
-@lru_cache(CACHE_SIZE)
+@lru_cache(maps.CACHE_SIZE)
 def strike_section(walker: RigidModel) -> StrikeSection:
     """Return the section of a walker just after heel strike, where its legs are straight."""
     straight = walker.E[rigid.STRAIGHT]
@@ -121,9 +110,8 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     # derivative of -acos(raised / length)
     rate = (math.cos(psi) * walker.hip_x - math.sin(psi) * walker.hip_y) / (length * math.sin(behind))
     swing = ahead - behind - walker.slope
-    return stance * straight[:, rigid.STANCE] + swing * straight[:, rigid.SWING], straight[
-        :, rigid.STANCE
-    ] + rate * straight[:, rigid.SWING]
+    by_swing, by_stance = straight[:, rigid.SWING], straight[:, rigid.STANCE]
+    return stance * by_stance + swing * by_swing, by_stance + rate * by_swing
 
 
 def section_basis(section: StrikeSection, z: Floats) -> Floats:
@@ -131,7 +119,7 @@ def section_basis(section: StrikeSection, z: Floats) -> Floats:
     if section.curved is None:
         return np.asarray(section.basis)
     basis = np.array(section.basis)
-    basis[0, : basis.shape[1] // 2] = valid(angles_on_slope(section.curved, float(z[0])))[1]
+    basis[0, : basis.shape[1] // 2] = maps.valid(angles_on_slope(section.curved, float(z[0])))[1]
     return basis
 
 
@@ -198,14 +186,8 @@ class RigidStepper(local):
         varied = tolerances.new(size * (1 + d))
         self.with_columns = lru_cache(KEPT_METHODS)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
-        self.memory = Memory(
-            varied,
-            finder,
-            new_idle_observer(),
-            np.zeros(size * (1 + d)),
-            new_heel_strikes(1, 0, columns=d),
-            np.zeros(d, np.int64),
-        )
+        y, pivots = np.zeros(size * (1 + d)), np.zeros(d, np.int64)
+        self.memory = Memory(varied, finder, new_idle_observer(), y, new_heel_strikes(1, 0, columns=d), pivots)
 
     def walk(
         self,
@@ -448,15 +430,84 @@ class SimilarWalker(NamedTuple):
             behind += math.cos(psi) * x - math.sin(psi) * y
         return self.radius * (before + after + self.apart) - behind
 
+
+class RigidMap(StepMap):
+    """Step map of the rigid model, in section coordinates of the walker scaled to unit size."""
+
+    monitors = (
+        Monitor("min_normal_force_N", "N", "minimum normal force on the stance foot", 0.0),
+        Monitor("max_friction_ratio", "1", "largest ratio of tangential to normal force"),
+        Monitor("max_scuff_depth_m", "m", "largest depth of the swing foot below the slope"),
+    )
+
+    tolerances = MONITORED_STEPS
+    probe = 2e-5
+
+    def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
+        """Prepare the map of a family of walkers.
+
+        walker_at  function from the parameter to a walker, or to None if the value gives no valid walker
+        scale      size of a typical change of the parameter
+        like       any walker of the family
+        """
+
+        @lru_cache(maps.CACHE_SIZE)
+        def unit_at(p: float) -> SimilarWalker | None:
+            walker = walker_at(p)
+            if walker is None:
+                return None
+            unit, units = unit_walker(walker)
+            section = strike_section(unit)
+            n = len(unit.arm_x)
+            feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
+            walkers = (unit, unit.exchanged) if unit.legs_differ else (unit,)
+            swings = tuple(LegSwing(each, strike_section(each), *leg_dimensions(each)) for each in walkers)
+            rolling = float(unit.radius), float(-section.start[rigid.SWING])
+            return SimilarWalker(unit, units, section, swings, feet.tolist(), *rolling)
+
+        self._unit_at = unit_at
+        self.scale = scale
+        self._like = like
+        self._exact = RigidStepper(like, exact)
+
+    @cached_property
+    def _quick(self) -> RigidStepper:
+        return RigidStepper(self._like, LONG_WALKS)
+
+    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
+        unit = self._unit_at(p)
+        if unit is None:
+            return maps.failed_step(None, z.size)
+        leg = unit.leg_swing(swing)
+        step = self._exact.walk(leg.section, z, derived=derived)
+        if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
+            standing = step.outcome is Outcome.WALKED
+            return maps.failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
+        ahead = step.z[0]
+        period_s = float(step.time[0]) * unit.units.time
+        angle = float(ahead[0])
+        if len(unit.swings) > 1:
+            length = leg.step_length(float(z[0]), step.strikes.before[0])
+        else:
+            length = unit.step_length(float(z[0]), angle)
+        length_m = length * unit.units.length
+        return MappedStep(Outcome.WALKED, ahead, step.DP[0], period_s, length_m, angle, period_s)
+
+    def watch(self, z: Floats, p: float, steps: int) -> Floats:
+        unit = maps.valid(self._unit_at(p))
+        walk = take_walk(unit.walker, MONITORED_STEPS, state_on_section(unit.walker, z), steps)
+        extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
+        return np.array(extremes) * (unit.units.force, 1.0, unit.units.length)
+
     def take_disturbed_walk(
-        self, stepper: RigidStepper, z: Floats, heights_m: Floats, push_N_s: float, swing: int
+        self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
-        walker, section, *_ = self.leg_swing(swing)
-        units = self.units
+        unit = maps.valid(self._unit_at(p))
+        walker, section, *_ = unit.leg_swing(swing)
+        units = unit.units
         start = np.array(state_on_section(walker, z))
         start = push_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        walk = stepper.walk(section, z, heights_m.size - 1, False, self.floor(z, heights_m), start)
+        walk = self._exact.walk(section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
         starts = np.vstack((start, after))[:-1]
         lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
@@ -464,42 +515,49 @@ class SimilarWalker(NamedTuple):
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
 
-    def ground_after_push(self, z: Floats, push_N_s: float, steps: int, swing: int) -> tuple[float, float]:
-        # Negative values mean that the ground would have to pull.
-        walker = self.leg_swing(swing).walker
-        start = state_on_section(walker, z)
-        pushed = as_state(push_at_hip(walker, start, push_N_s / self.units.impulse))
-        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
-        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
-        return impulse * self.units.impulse, walk.min_normal_force * self.units.force
+    def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+        unit = maps.valid(self._unit_at(p))
+        observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
+        floor = unit.floor(z, heights_m)
+        self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
+        return reorder_by_leg(observer.states[:, [rigid.SWING, rigid.STANCE]], observer.steps)
 
     def differentiate_walk(
-        self, stepper: RigidStepper, z: Floats, heights_m: Floats, along: Floats, times_s: Floats, kicked: bool
+        self,
+        z: Floats,
+        p: float,
+        heights_m: Floats,
+        along: Floats,
+        times_s: Floats = maps.NO_TIMES,
+        kicked: bool = False,
     ) -> VariedWalk | None:
         """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
-        units, (d, m), steps = self.units, self.section.basis.shape, heights_m.size - 1
-        rises, nearest = self.floor(z, heights_m)
-        walk = stepper.walk(self.section, z, steps, False, (rises, nearest))
+        unit = self._unit_at(p)
+        if unit is None:
+            return None
+        units, (d, m), steps = unit.units, unit.section.basis.shape, heights_m.size - 1
+        rises, nearest = unit.floor(z, heights_m)
+        walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
         if walk.outcome is not Outcome.WALKED:
             return None
-        starts = np.vstack((state_on_section(self.walker, z), walk.strikes.after))
+        starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
         # No kicks at the start, because changes of the start are columns of `along`, and none after the last step.
-        kicks = [unit_kicks(*self.leg_swing(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
+        kicks = [unit_kicks(*unit.leg_swing(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
-        count = along.shape[1] + sum(map(len, kicks))
+        count = given + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
         lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
         columns = np.zeros((count, m))
         since = np.zeros(count)
-        columns[:given] = along[:d].T @ section_basis(self.section, z)
+        columns[:given] = along[:d].T @ section_basis(unit.section, z)
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
         for step, start in enumerate(starts[:-1]):
-            walker, section, *_ = self.leg_swing(step)
+            walker, section, *_ = unit.leg_swing(step)
             room = LAST_SAMPLE * (touches[step + 1] - touches[step])
             times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
-            tangents = stepper.differentiate(section, start, (rises[step : step + 2], nearest), times)
+            tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
             if tangents is None:
                 return None
             moved = np.column_stack((columns, lifts[step + 1]))
@@ -523,105 +581,6 @@ class SimilarWalker(NamedTuple):
             reorder_by_leg(samples, of_step),
         )
 
-
-class RigidMap(StepMap):
-    """Step map of the rigid model, in section coordinates of the walker scaled to unit size."""
-
-    monitors = (
-        Monitor("min_normal_force_N", "N", "minimum normal force on the stance foot", 0.0),
-        Monitor("max_friction_ratio", "1", "largest ratio of tangential to normal force"),
-        Monitor("max_scuff_depth_m", "m", "largest depth of the swing foot below the slope"),
-    )
-
-    tolerances = MONITORED_STEPS
-    probe = 2e-5
-
-    def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare the map of a family of walkers.
-
-        walker_at  function from the parameter to a walker, or to None if the value gives no valid walker
-        scale      size of a typical change of the parameter
-        like       any walker of the family
-        """
-
-        @lru_cache(CACHE_SIZE)
-        def unit_at(p: float) -> SimilarWalker | None:
-            walker = walker_at(p)
-            if walker is None:
-                return None
-            unit, units = unit_walker(walker)
-            section = strike_section(unit)
-            n = len(unit.arm_x)
-            feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
-            walkers = (unit, unit.exchanged) if unit.legs_differ else (unit,)
-            swings = tuple(LegSwing(each, strike_section(each), *leg_dimensions(each)) for each in walkers)
-            rolling = float(unit.radius), float(-section.start[rigid.SWING])
-            return SimilarWalker(unit, units, section, swings, feet.tolist(), *rolling)
-
-        self._unit_at = unit_at
-        self.scale = scale
-        self.names = SECTION_NAMES[: int(like.coordinates)]
-        self._like = like
-        self._exact = RigidStepper(like, exact)
-
-    @cached_property
-    def _quick(self) -> RigidStepper:
-        return RigidStepper(self._like, LONG_WALKS)
-
-    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
-        unit = self._unit_at(p)
-        if unit is None:
-            return failed_step(None, z.size)
-        leg = unit.leg_swing(swing)
-        section = leg.section
-        step = self._exact.walk(section, z, derived=derived)
-        if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
-            standing = step.outcome is Outcome.WALKED
-            return failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
-        ahead = step.z[0]
-        period_s = float(step.time[0]) * unit.units.time
-        DP = step.DP[0]
-        angle = float(ahead[0])
-        if len(unit.swings) > 1:
-            length = leg.step_length(float(z[0]), step.strikes.before[0])
-        else:
-            length = unit.step_length(float(z[0]), angle)
-        length_m = length * unit.units.length
-        return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
-
-    def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        unit = valid(self._unit_at(p))
-        walker = unit.walker
-        units = unit.units
-        walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
-        extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
-        return np.array(extremes) * (units.force, 1.0, units.length)
-
-    def take_disturbed_walk(
-        self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
-    ) -> DisturbedWalk:
-        unit = valid(self._unit_at(p))
-        return unit.take_disturbed_walk(self._exact, z, heights_m, push_N_s, swing)
-
-    def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        unit = valid(self._unit_at(p))
-        observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
-        floor = unit.floor(z, heights_m)
-        self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
-        return reorder_by_leg(observer.states[:, [rigid.SWING, rigid.STANCE]], observer.steps)
-
-    def differentiate_walk(
-        self,
-        z: Floats,
-        p: float,
-        heights_m: Floats,
-        along: Floats,
-        times_s: Floats = NO_TIMES,
-        kicked: bool = False,
-    ) -> VariedWalk | None:
-        unit = self._unit_at(p)
-        return None if unit is None else unit.differentiate_walk(self._exact, z, heights_m, along, times_s, kicked)
-
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         unit = self._unit_at(p)
         if unit is None:
@@ -634,10 +593,17 @@ class RigidMap(StepMap):
         self, z: Floats, p: float, push_N_s: float, steps: int, swing: int = 0
     ) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
-        return valid(self._unit_at(p)).ground_after_push(z, push_N_s, steps, swing)
+        # Negative values mean that the ground would have to pull.
+        unit = maps.valid(self._unit_at(p))
+        walker = unit.leg_swing(swing).walker
+        start = state_on_section(walker, z)
+        pushed = as_state(push_at_hip(walker, start, push_N_s / unit.units.impulse))
+        impulse = rigid.momentum(walker, pushed)[1] - rigid.momentum(walker, start)[1]
+        walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
+        return impulse * unit.units.impulse, walk.min_normal_force * unit.units.force
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        unit = valid(self._unit_at(p))
+        unit = maps.valid(self._unit_at(p))
         return unit.units.length, unit.units.time
 
     def replace_tolerances(self, tolerances: Tolerances) -> RigidMap:

@@ -11,7 +11,8 @@ import numpy as np
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 
-HIPS = ("hip_x", "hip_y", "swing_hip_x", "swing_hip_y")
+# fields of a model that are lengths and depend on its legs
+LENGTHS = ("radius", "swing_radius", "foot_x", "foot_y", "hip_x", "hip_y", "swing_hip_x", "swing_hip_y")
 
 
 class Units(NamedTuple):
@@ -36,11 +37,9 @@ class Units(NamedTuple):
 
         Raises KeyError for an unknown unit.
         """
-        inertia = self.mass * self.length**2
-        damping = self.energy * self.time
         basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
-        derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}
-        return (basic | derived | {"N m/rad": self.energy, "N m s/rad": damping})[unit]
+        derived = {"kg m^2": self.mass * self.length**2, "N s": self.impulse, "N m": self.energy}
+        return (basic | derived | {"N m/rad": self.energy, "N m s/rad": self.energy * self.time})[unit]
 
 
 def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
@@ -57,15 +56,14 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
         **dict.fromkeys(("arm_x", "arm_y"), moment),
         "laws": 1.0 / np.array(hinge_law(walker, HIP_ROW).units(units.energy, units.time)),
         "push_off": 1.0 / units.impulse,
-        **dict.fromkeys(("radius", "swing_radius", "foot_x", "foot_y", *HIPS), 1.0 / length),
+        **dict.fromkeys(LENGTHS, 1.0 / length),
     }
 
     def similar(model: RigidModel) -> RigidModel:
+        units = dict.fromkeys(("mass", "leg_length", "gravity"), 1.0)
         scaled = {name: scale * model[name] for name, scale in scales.items()}
         # The components of gravity follow from the new g.
-        return change_slope(
-            replace_fields(model, {"mass": 1.0, "leg_length": 1.0, "gravity": 1.0, **scaled}), model.slope
-        )
+        return change_slope(replace_fields(model, units | scaled), model.slope)
 
     unit = similar(walker)
     return unit if walker.paired_with is None else pair(unit, similar(walker.paired_with)), units

@@ -61,10 +61,8 @@ class Modes(NamedTuple):
 def linear_modes(walker: RigidModel) -> Modes | None:
     """Return the modes of the swing phase about upright legs, or None if the legs have too little inertia."""
     legs = leg_columns(walker)
-    n = len(walker.arm_x)
     level = rigid.change_slope(walker, 0.0)
-    inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
-    rigid.equations(level, level.zero_state, s, c, F, U, inertias, r)
+    inertias = rigid.mass_matrix(level, level.zero_state)
     M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
     # det(K - x M) = first x^2 - 2 half x + last
     first, last = np.linalg.det(M), np.linalg.det(K)

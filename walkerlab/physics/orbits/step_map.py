@@ -99,7 +99,7 @@ class Stepper(Protocol):
 class StepMap(Stepper, Protocol):
     """Step of a walker from section to section, with the derivatives and limits that continuation needs."""
 
-    names: tuple[str, ...]  # names of the section coordinates, which are all of magnitude one
+    # all coordinates of the section are of magnitude one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures
     scale: float  # size of a typical change of the parameter
     tolerances: Tolerances  # solver settings of a step

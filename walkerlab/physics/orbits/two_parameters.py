@@ -99,7 +99,7 @@ def follow_curve(
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
     x = np.append(bifurcation.point.x, plane.value / scales[1])
     x[-2] = bifurcation.value / scales[0]
-    start = correct(equations, x, np.eye(x.size)[-1], control.tolerance)
+    start = correct(equations, x, np.eye(x.size)[-1], Effort(control.tolerance))
     if isinstance(start, NotConverged):
         return None
     (behind, begin), (ahead, end) = (

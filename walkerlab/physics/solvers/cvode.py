@@ -63,23 +63,16 @@ class CvodeSolver:
         self.t = float(ahead.t)
         self.y = ahead.y
 
-    def dense_output(self) -> LastStep:
-        """Return the solution within the last step, valid until the next step."""
-        return LastStep(self)
+    def dense_output(self) -> Callable[[Any], Any]:
+        """Return CVODE's interpolating polynomial of the last step, valid until the next step."""
+        return self.interpolate
 
-
-class LastStep:
-    """CVODE's interpolating polynomial of the last step."""
-
-    def __init__(self, solver: CvodeSolver) -> None:
-        self.solver = solver
-
-    def __call__(self, times: Any) -> Any:
+    def interpolate(self, times: Any) -> Any:
         """Evaluate the state (n,) at one time (s), or states (n, times) at several."""
-        self.solver.interpolated = True
+        self.interpolated = True
         if np.ndim(times) == 0:
             return self.state_at(float(times))
         return np.column_stack([self.state_at(time) for time in times.tolist()])
 
     def state_at(self, time: float) -> Any:
-        return self.solver.solver.step(time, "normal", None).y
+        return self.solver.step(time, "normal", None).y

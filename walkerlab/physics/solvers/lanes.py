@@ -89,7 +89,7 @@ def _is_number(kind: Any) -> bool:
     return isinstance(kind, LanesType | types.Float | types.Integer)
 
 
-def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
+def _define(function: Callable[..., Any], build: Callable[..., Any], *arguments: Any) -> None:
     """Extend a scalar function to lanes. `build` receives the IR builder and the arguments as lanes."""
 
     class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
@@ -107,10 +107,6 @@ def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: 
         return build(builder, *lanes)
 
     lower_builtin(function, *arguments)(generate)
-
-
-def _instruction(name: str) -> Callable[..., Any]:
-    return lambda builder, a, b: getattr(builder, name)(a, b)
 
 
 def _intrinsic(name: str) -> Callable[..., Any]:
@@ -145,22 +141,19 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 def teach_arithmetic() -> None:
     """Register arithmetic on lanes with numba. This is needed before the first kernel with lanes is compiled."""
     # This is not done on import, because it affects everything that the process compiles.
-    unary = (LANES,)
-    binary = (LANES, LANES)
-    variadic = (types.VarArg(LANES),)
     for plain, in_place, instruction in (
-        (operator.add, operator.iadd, "fadd"),
-        (operator.sub, operator.isub, "fsub"),
-        (operator.mul, operator.imul, "fmul"),
-        (operator.truediv, operator.itruediv, "fdiv"),
+        (operator.add, operator.iadd, ir.IRBuilder.fadd),
+        (operator.sub, operator.isub, ir.IRBuilder.fsub),
+        (operator.mul, operator.imul, ir.IRBuilder.fmul),
+        (operator.truediv, operator.itruediv, ir.IRBuilder.fdiv),
     ):
         for each in (plain, in_place):
-            _define(each, _instruction(instruction), binary)
-    _define(operator.neg, lambda builder, a: builder.fneg(a), unary)
-    _define(abs, _intrinsic("fabs"), unary)
-    _define(math.sqrt, _intrinsic("sqrt"), unary)
-    _define(min, _pairwise("minnum"), variadic)
-    _define(max, _pairwise("maxnum"), variadic)
+            _define(each, instruction, LANES, LANES)
+    _define(operator.neg, ir.IRBuilder.fneg, LANES)
+    _define(abs, _intrinsic("fabs"), LANES)
+    _define(math.sqrt, _intrinsic("sqrt"), LANES)
+    _define(min, _pairwise("minnum"), types.VarArg(LANES))
+    _define(max, _pairwise("maxnum"), types.VarArg(LANES))
 
 
 @intrinsic

@@ -400,11 +400,6 @@ def rewind_radau5(method: Radau5, system: Any) -> None:
     control[SMOOTH], control[H_OLD] = 0.0, 0.0
 
 
-@stepping.prepare_dense.case(Radau5)
-def prepare_dense_radau5(method: Radau5, system: Any) -> None:
-    """Do nothing: `accept` has stored the polynomial."""
-
-
 @stepping.interpolate.case(Radau5)
 def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
     s = fraction

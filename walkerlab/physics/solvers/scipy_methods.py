@@ -144,21 +144,18 @@ def rewind_scipy(method: ScipyMethod, system: Any) -> None:
     method.y[:] = method.y_old
 
 
-@stepping.prepare_dense.case(ScipyMethod)
-def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
-    """Do nothing: `step_solver` has stored the dense output."""
+def dense_at(method: ScipyMethod, fractions: Any) -> Any:
+    """Evaluate the dense output at a fraction of the last step, or at several."""
+    t_old, t = method.clock[stepping.T_OLD], method.clock[stepping.T]
+    return method.dense(t_old + fractions * (t - t_old))
 
 
 @stepping.interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
-    t_old = method.clock[stepping.T_OLD]
-    t = method.clock[stepping.T]
-    y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
+    y[:] = dense_at(method, fraction)[: y.size]
 
 
 @stepping.sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
-    t_old = method.clock[stepping.T_OLD]
-    t = method.clock[stepping.T]
-    columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
+    columns = dense_at(method, fractions)[: states.shape[1]]
     states[: len(fractions), : len(columns)] = columns.T

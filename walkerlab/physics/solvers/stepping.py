@@ -40,9 +40,9 @@ def rewind(method: Any, system: Any) -> None:
     """Go back to the start of the last step, to take it again up to an event."""
 
 
-@dispatch_by_type
+@dispatch_by_type_or_default
 def prepare_dense(method: Any, system: Any) -> None:
-    """Prepare the dense output of the last step for `interpolate`."""
+    """Prepare the dense output of the last step for `interpolate`. Most methods need no case: a step stores it."""
 
 
 @dispatch_by_type

@@ -23,7 +23,7 @@ class ResolvedRun:
 
     loaded: loader.LoadedConfig
     folder: RunFolder
-    extends: str  # config that a new one, written from this run's results, extends: a file or a built-in name
+    extends: str  # file or built-in name of the config that new configs with results of this run extend
 
 
 def resolve(
@@ -45,8 +45,8 @@ def resolve(
     """
     path = None if text is None else Path(text)
     run = None
-    if path is not None and text not in files.builtin_names() and not (files.is_file(path) and path.suffix != SUFFIX):
-        run = artifact_at(path) or run_at(str(text), runs)
+    if text is not None and not files.is_config(text):
+        run = artifact_at(Path(text)) or run_at(text, runs)
     if run is not None:
         folder, earlier = run
         read = loader.load(earlier, sets, strides, name)
@@ -67,7 +67,7 @@ def resolve(
 
 
 def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str]]:
-    """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
+    """Return the file of a run's config and, in the form KEY OLD -> NEW, the changes made in it since the run.
 
     Keys that were set when the run was made are not compared.
     """
@@ -111,14 +111,13 @@ def warn_of_edits(config: schema.Config | None, folder: RunFolder, warn: Callabl
 
 def refuse_invalid_parts(read: loader.LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
-    config = read.config
-    if not isinstance(config.walker, walkers.AssembledWalker):
+    if not isinstance(read.config.walker, walkers.AssembledWalker):
         return
-    # Imported here, because mechanics take long to import, and only walkers of parts can be invalid.
+    # Imported here, because importing the mechanics takes long, and only walkers of parts can be invalid here.
     from walkerlab.scene.rigid import level_walker
 
     try:
-        level_walker(config.walker, config.gravity_m_s2)
+        level_walker(read.config.walker, read.config.gravity_m_s2)
     except ConfigError as error:
         raise problems.problem_error(read.tree.entries["walker"].position, error.message, advice=error.advice) from None
 
@@ -157,7 +156,7 @@ def source_of(path: Path | None, runs: Path) -> str:
 
     The path is relative so that a project can be moved together with its runs.
     """
-    file = (files.builtin_config(files.DEFAULT) if path is None else files.find_config(path)).path.resolve()
+    file = files.find_config(path).path.resolve()
     if file.parent == files.BUILTIN_FOLDER.resolve():
         return f"{BUILTIN}{file.name}"
     return os.path.relpath(file, runs.resolve())

@@ -50,9 +50,8 @@ class Keys:
         """
         once = {} if again else {"again": False}
         dependencies = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
-        return Identity(
-            stage.name, dependencies, input_keys, self.code_digest(stage.name, added_code(stage, dependencies))
-        )
+        code_digest = self.code_digest(stage.name, added_code(stage, dependencies))
+        return Identity(stage.name, dependencies, input_keys, code_digest)
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
         """Return the digest of a stage's code and of the code of extensions that it uses. It is computed at the first
@@ -68,8 +67,8 @@ class Keys:
 def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     """Return the code of extensions, as "module:name", that a stage's result depends on.
 
-    This is the code of the laws that the stage's part of the config, or `own`, its other dependencies, name.
-    For drawings, it is the code of everything drawn.
+    This is the code of the walkers, laws and equations named in `own`, which holds the stage's part of the config and
+    its other dependencies. For drawings, the code of everything drawn is added.
     """
     text = json.dumps(own)
     # If a word happens to be the value of another key, the identity contains unnecessary code, which does no harm.
@@ -95,7 +94,7 @@ class Step:
     action: Action
     reason: str  # reason for the action
     identity: Identity | None = None  # identity of the stage's result; None if the stage is left out
-    found: Content | None = None  # the stored result if it is intact: to be reused, or outdated
+    found: Content | None = None  # the stored result if it is intact, whether up to date or outdated
     damaged: Path | None = None  # file of the stored result, if it is damaged
     origin: Path | None = None  # file of the result to reuse, if it is in another run's folder
     wall_s: float = 0.0  # run time; 0 if the stage has not run
@@ -169,8 +168,7 @@ class FolderResults:
         """
         origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
-        path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, origin.finish())
+        stored = artifact.write(self.run.artifact(step.stage.name), answer, step.identity, origin.finish())
         checkpoint.forget()
         return stored
 
@@ -184,7 +182,7 @@ class FolderResults:
 
 
 def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
-    """Say which input was recomputed with other content since the result was stored, or return '' if none was."""
+    """Say which input was recomputed with different content since the result was stored, or return '' if none was."""
     for name, result in inputs.items():
         if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
@@ -200,7 +198,7 @@ def input_digest(stage: Stage, result: Content) -> str:
 
 
 def find_elsewhere(folder: runs.RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find a result with this key in another run folder, and return its file and itself, or None. Damaged files are
+    """Find a result with this key in another run folder, and return its path and content, or None. Damaged files are
     ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())

@@ -37,11 +37,6 @@ def nothing(_config: object) -> tuple[Any, ...]:
     return ()
 
 
-def no_dependencies(_config: object) -> Mapping[str, Any]:
-    """Return an empty mapping, for stages whose results depend only on config, inputs and code."""
-    return {}
-
-
 def dependency(name: str, code: str) -> "Callable[[Config], Mapping[str, Any]]":
     """Return a function of the config that returns {name: value}, where `code`, "module:name", computes the value."""
     return lambda config: {name: load(code)(config)}
@@ -65,8 +60,7 @@ def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
 
 
 def walks_and(*names: str) -> Inputs:
-    """Return a function that returns the stages in `names`, the walking ones and, if a config has one, the recorded
-    walk."""
+    """Return a function that lists the stages of `WALKED`, `recorded-walk` if a config has a recording, and `names`."""
     return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
@@ -124,13 +118,13 @@ class Stage:
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
     # "times": it measures run times, so it must run alone. "draws": it also writes files, from the results that exist.
     work: Literal["computes", "times", "draws"] = "computes"
-    # The only command that runs the stage, if others that need it do not: the stage's own or `STAGE --full`.
+    # The only command that runs the stage: its own or `STAGE --full`. Empty if stages that need this one run it, too.
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # stages whose results suffice for a partial drawing while others still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
-    # returns, by name, whatever the result depends on besides, such as files (digests) and other programs (versions)
-    depends_on: "Callable[[Config], Mapping[str, Any]]" = no_dependencies
+    # returns, by name, whatever else the result depends on, such as files (digests) and other programs (versions)
+    depends_on: "Callable[[Config], Mapping[str, Any]]" = lambda _config: {}
     checks: "Callable[[Config], object]" = nothing  # raises ConfigError for a config with which no command should run
     # "module:name" of the `Offer` of the stage's command. Empty for the usual command, which works on a run.
     adds_command: str = ""
@@ -206,5 +200,5 @@ class Stage:
 
     @property
     def on_demand(self) -> bool:
-        """Whether the stage runs only by the command of its name."""
+        """Whether only the command of the same name runs the stage."""
         return self.only_by == self.name

@@ -62,7 +62,7 @@ def compile_contact(method: str, config: Config) -> None:
 
 
 def compile_plain_systems(config: Config) -> None:
-    """Compile the functions that solvers without our events call. `stability` compares the contact walk with these."""
+    """Compile the functions that solvers without our events call. `stability` compares contact walks with theirs."""
     from walkerlab.physics.ground.on_pads import OnPads
     from walkerlab.physics.ground.walker import place_on_ground
     from walkerlab.physics.solvers.scipy_methods import right_hand_side
@@ -90,14 +90,11 @@ def compile_lanes(config: Config) -> None:
 
 
 PARTS: tuple[Callable[[Config], None], ...] = (
-    *(
-        partial(compile_model, method)
-        for method, compile_model in product(COMPILED_METHODS, (compile_contact, compile_rigid))
-    ),
+    *(partial(model, method) for method, model in product(COMPILED_METHODS, (compile_contact, compile_rigid))),
     compile_plain_systems,
     compile_lanes,
 )
-"""Functions that compile some kernels of a config each, the slowest first."""
+"""Functions that each compile some of a config's kernels, the slowest first."""
 
 
 def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
@@ -109,8 +106,8 @@ def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
 
 
 def compile_ahead(configs: Iterable[Config], jobs: int) -> set[str]:
-    """Compile the kernels of these configs, unless package or cache has them. Return the names of the files of all
-    kernels."""
+    """Compile the kernels of these configs, unless the package or the cache already has them. Return the names of the
+    files of all kernels."""
     calls = [partial(compile_part, part, config) for config, part in product(configs, PARTS)]
     return set[str]().union(*map_in_order(calls, jobs))
 

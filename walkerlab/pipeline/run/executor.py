@@ -1,4 +1,4 @@
-"""Carry out the steps that a planner decides: reuse, run or leave out each stage, one by one or side by side."""
+"""Carry out a plan: reuse, run or leave out each stage, one after another or in parallel."""
 
 import contextlib
 import importlib

@@ -144,13 +144,12 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     values = summary["best"] if "best" in summary else {row["key"]: row["value"] for row in summary["estimates"]}
     found = run.loaded.variant([files.parse_setting(f"{key}={value!r}") for key, value in values.items()])
     base = loader.paper_config_with({}) if run.extends == files.DEFAULT else run.loaded.base
-    # The new config describes the walker, so it leaves out the block with the question that found it.
+    # The new config describes the walker that was found, without the settings of the stage that found it.
     changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
-    # A path in `extends` is relative to the file in which it stands.
+    # A path in `extends` is relative to the file that contains it.
     typed = run.extends if run.extends in files.builtin_names() else os.path.relpath(run.extends, report.run_dir)
-    return write_numbered(
-        report.run_dir / f"{name}.yaml", writer.to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
-    )
+    text = writer.to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
+    return write_numbered(report.run_dir / f"{name}.yaml", text)
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:

@@ -92,7 +92,7 @@ class Spread:
     batch_s: float  # target duration of a batch, s; 0 makes batches of one unit
     unit_s: float | None = None  # run time of a unit, s; None until the first batch has returned
     _again: deque[tuple[Batch, int]] = field(default_factory=deque)
-    _suspects: deque[Batch] = field(default_factory=deque)  # units that later run alone, for the last time
+    _suspects: deque[Batch] = field(default_factory=deque)  # units that run alone later, as their last attempt
     _running: dict[Future[Any], tuple[Batch, int]] = field(default_factory=dict)
     _deaths: int = 0
     _alive: bool = False
@@ -148,7 +148,7 @@ class Spread:
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Retry a failed batch, then its halves, and give up a unit that keeps failing. Bugs are raised again."""
+        """Retry a failed batch, then its halves, and give up on a unit that keeps failing. Bugs are raised again."""
         of_worker = isinstance(error, WorkerDiedError | JobEndedError)
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not of_worker):
             raise error

@@ -178,7 +178,7 @@ class Worker:
         Raises WorkerDiedError and WorkerTimeoutError.
         """
         work = pickle.dumps(call)
-        with contextlib.suppress(OSError):  # if the worker is dead, its answer is missed below
+        with contextlib.suppress(OSError):  # if the worker is dead, `_receive` raises the error
             self._line.send_bytes(work)
         while isinstance(message := self._receive(timeout_s), CallMessage):
             if hear is not None:
@@ -202,7 +202,7 @@ class Worker:
         return self.process.poll() is None
 
     def leave(self) -> None:
-        """Ask the process to drop its call and end."""
+        """Ask the process to abandon its call and end."""
         self.process.terminate()
 
     def wait_for_end(self) -> int:
@@ -309,7 +309,7 @@ def map_in_order(
 
 
 class LeaveError(BaseException):
-    """Error with which a signal ends this process and drops its call."""
+    """Error that a signal raises to end this process and abandon the call that it is running."""
 
 
 def tell(value: Any) -> None:
@@ -337,7 +337,7 @@ def serve(number: int, modules: Sequence[str]) -> None:
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
-    # The call was dropped. Terminal and parent may each send a signal, so a second one simply ends the process.
+    # The call has been abandoned. The terminal and the parent may both send a signal, so a second one ends the process.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 

@@ -31,7 +31,7 @@ HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqr
 REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
-FAILED = grid.UNREACHED - 1  # marks a cell whose walk fails, among numbers of attractors
+FAILED = grid.UNREACHED - 1  # stands for a failed walk in an array of attractor indices
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -59,22 +59,19 @@ def run(
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
     started_at = time.perf_counter()
-    shared_from = question.shared_from
-    every = range(window.size)
-    units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
-    parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
+    units = units_of("cells", range(window.size), question.cells_at_once, 1, partial(ends_of, question, window))
+    parts, walks = complete(units, checkpoint, "basin", progress, jobs, question.shared_from)
     # Work units return floats, because a checkpoint can store only floats.
     ends = grid.WalkEnds(*np.concatenate([np.reshape(part, (3, -1)) for part in parts], axis=1).astype(np.int64))
     is_walking = ends.outcome == Outcome.WALKED
-    # The edge of the basin includes that between walks that fail and walks that go on without reaching an attractor.
+    # The edge also runs between walks that fail and walks that go on without reaching an attractor.
     edges = grid.edge_cells(np.where(is_walking, ends.attractor, FAILED).reshape(window.cells))
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
-        refine = config.basin.refine
-        walks_of_cell = refine ** len(window.axes)
-        shares = partial(shares_of, question, window, refine)
+        walks_of_cell = config.basin.refine ** len(window.axes)
+        shares = partial(shares_of, question, window, config.basin.refine)
         units = units_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
-        edge_shares, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
+        edge_shares, more = complete(units, checkpoint, "basin: edges", progress, jobs, question.shared_from)
         walking[edges], walks = np.concatenate(edge_shares), walks + more
     rate = {"trajectories_per_s": walks / (time.perf_counter() - started_at)} if walks else {}
     answer = summary(config.basin, window, ends, walking.reshape(window.cells), question)
@@ -131,8 +128,6 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
         raise walkers.contact_required_error("basin.model: contact", config.walker, "Add one.")
-    # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.contact import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps
@@ -141,9 +136,9 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     answer = contact.contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
     scene = replace(contact.scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
-    starts = build_scaled_starts(scene, rigid, state, steps, answer, contact.tolerances_of(config, steps))
+    starts = contact.build_scaled_starts(scene, rigid, state, steps, answer, contact.tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
-    return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
+    return ContactQuestion(scene, rigid, contact.scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
 def group_of(settings: analyses.Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats) -> Group:

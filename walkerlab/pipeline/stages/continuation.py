@@ -89,7 +89,7 @@ class FamilyQuestion:
 
 def question_over(block: analyses.Span, config: ContinuationConfig, *path: str) -> FamilyQuestion:
     parameter = parameter_of(block.over, config, (*path, "over"))
-    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.most))
+    return FamilyQuestion(config, parameter, ValueSpan(block.least, block.to))
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
@@ -117,7 +117,7 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     content = Content(groups(families, answer, config, parameter, None if second is None else second.parameter), answer)
     if not any(family.branches for family in families):
         raise NoAnswer(
-            f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
+            f"no gait was found with {parameter.key} from {block.least:g} to {block.to:g} {parameter.unit}: "
             f"no gait at any of {len(question.start_values())} trial values",
             "Choose another span (--from, --to), or change other parameters.",
             content,
@@ -223,8 +223,6 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 
 def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -> dict[str, Any]:
     """Summarise the families. Parameter values are in the key's unit, and `again` is as in `run`."""
-    config = question.config
-    parameter = question.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
         return [{"model": family.model, **row} for family in families for row in of_model(family)]
@@ -233,10 +231,10 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
         return {family.model: value for family in families if (value := of_model(family)) is not None}
 
     return {
-        "over": parameter.key,
-        "unit": parameter.unit,
-        "from": config.continuation.least,
-        "to": config.continuation.most,
+        "over": question.parameter.key,
+        "unit": question.parameter.unit,
+        "from": question.config.continuation.least,
+        "to": question.config.continuation.to,
         "branches": rows(branch_rows),
         "bifurcations": rows(bifurcation_rows),
         "first_doubling": values_by_model(lambda family: first_doubling(family.branches)),
@@ -244,7 +242,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
         "cascades": rows(cascade_rows),
         "limits": rows(limit_rows),
         "numerical_error": values_by_model(sample_again) if again else {},
-        "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
+        "endings": rows(partial(ending_rows, parameter=question.parameter, config=question.config)),
         "attractors": rows(lambda family: [attractor_summary(family)] if family.attractors.found else []),
         "curves": rows(curve_rows),
         "regions": rows(region_rows),
@@ -297,9 +295,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
     """Yield a row for each point where one of a model's assumptions ceases to hold."""
     for branch in family.branches:
         for crossing in branch.crossings:
-            monitor = crossing.monitor
-            limit = {"what": monitor.meaning, "limit": monitor.limit}
-            yield {"period": branch.period, "value": crossing.value, **limit}
+            what, limit = crossing.monitor.meaning, crossing.monitor.limit
+            yield {"period": branch.period, "value": crossing.value, "what": what, "limit": limit}
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
@@ -392,7 +389,6 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     only if neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
     """
     attractors = family.attractors
-    exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
     # From the last flip to the limit of the cascade, gaits of longer periods than those followed are stable.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
@@ -400,7 +396,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
         attractor.value
         for attractor in attractors.found
         if attractor.period == 0
-        and may_diverge(exponents, attractor.value)
+        and may_diverge(family.exponents, attractor.value)
         and not any(min(pair) <= attractor.value <= max(pair) for pair in periodic)
     ]
     return {

@@ -32,7 +32,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
 SOLVED: Final = newton.Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # step, relative to the range of the bounds, of difference quotients of largest disturbances
+DIFFERENCE: Final = 5e-3  # difference step for largest disturbances, as a fraction of the range between the bounds
 FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; at a coarser one, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
@@ -55,12 +55,11 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     design = config.design or analyses.Design()
     quantity = design.minimise or design.maximise
     assert quantity is not None, "refuse rejects a design without a quantity"
-    parameters = [parameter_of(key, config) for key in design.over]
-    gaits = Gaits(config, design, parameters, inputs["fixedpoint"].summary, progress)
+    gaits = Gaits(config, design, inputs["fixedpoint"].summary, progress)
     lower, upper = np.array(list(design.over.values()), float).T
     keep = {name: (bounds[0], bounds[1]) for name, bounds in design.keep.items()}
     question = DesignProblem(quantity, -1.0 if design.maximise else 1.0, lower, upper, keep, gaits.gait_at)
-    current = np.array([parameter.value_in(config) for parameter in parameters])
+    current = np.array([parameter.value_in(config) for parameter in gaits.parameters])
     progress.start("design")
     own_gait = gaits.gait_at(current)
     own_z = gaits.z
@@ -72,8 +71,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         # Otherwise the result of this search would depend on the searches before it.
         gaits.z = own_z
         if name in checkpoint.kept:
-            entry = np.array(checkpoint.kept[name])
-            counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + current.size))
+            counts, gradient_norm, x, gaits.z = np.split(np.array(checkpoint.kept[name]), (2, 3, 3 + current.size))
             point = gaits.gait_at(x)
             gaits.counts = before + counts.astype(int)
             return DesignSearch(x, point, float(gradient_norm[0]))
@@ -165,16 +163,11 @@ class Gaits:
     """Computes gait and gradients at parameter values. Each search for a gait starts from the last gait found."""
 
     def __init__(
-        self,
-        config: DesignConfig,
-        design: analyses.Design,
-        parameters: list[Parameter],
-        gait: Mapping[str, Any],
-        progress: Progress,
+        self, config: DesignConfig, design: analyses.Design, gait: Mapping[str, Any], progress: Progress
     ) -> None:
         self.config = config
         self.model = design.model
-        self.parameters = parameters
+        self.parameters = [parameter_of(key, config) for key in design.over]
         self.progress = progress
         wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
         self.wanted = wanted - LARGEST.keys()
@@ -207,9 +200,8 @@ class Gaits:
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = fixed_point.find_gaits(walker, config.seed).gait
-            match = (
-                match if gait is None else self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
-            )
+            if gait is not None:
+                match = self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
         if match is None:
             return None
         standpoint, numbers = match
@@ -240,7 +232,7 @@ class Gaits:
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)
 
     def largest_disturbances(self, subject: ModelUnderTest, names: Collection[str]) -> dict[str, float]:
-        """Find the largest disturbances that a gait survives in steps of both legs, by the names of `LARGEST`."""
+        """Find the largest disturbances that a gait survives, whichever leg swings. `names` are keys of `LARGEST`."""
         gaits = subject.quick_by_leg()
         return {
             name: min(largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for gait in gaits)

@@ -14,14 +14,13 @@ from walkerlab.physics.orbits import family_search, rigid_map, similarity, step_
 from walkerlab.physics.orbits.families import GaitBranch
 from walkerlab.physics.solvers import registry, system
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
-from walkerlab.pipeline.stages.walk import evenly_spread, select_samples
+from walkerlab.pipeline.stages.walk import STRIDE, evenly_spread, select_samples
 from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
 MOTIONS_OF_BRANCH = 12  # maximum number of gaits per branch whose walks are stored
 MAX_MOTION_PERIOD = 4  # the walks of gaits with longer periods (steps) are not stored
-STRIDE = 2  # number of steps after which the legs have the same roles again
 TOLERANCES = registry.Tolerances("dop853", 1e-9, 1e-11, registry.ENDLESS)
 ALL_OUTPUTS: Final[tuple[schema.Output, ...]] = ("states", "energies", "forces")
 SAMPLE_STRIDE = 3  # of the samples between heel strikes, every third is stored
@@ -84,9 +83,8 @@ def groups(
             continue
         own: dict[str, Group] = {}
         for number, curve in enumerate(family.curves):
-            own[f"curve_{number}"] = Group(
-                coordinates(curve, "point", "point"), {"kind": curve.kind, "period": curve.period}
-            )
+            about = {"kind": curve.kind, "period": curve.period}
+            own[f"curve_{number}"] = Group(coordinates(curve, "point", "point"), about)
         if family.regions is not None:
             periods = Variable(family.regions.period, ("first", "second"), "1", PERIOD_TEXT)
             own["regions"] = Group({**coordinates(family.regions, "first", "second"), "period": periods})
@@ -109,7 +107,7 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """Bifurcation on a branch: the index of the branch's point before it, and the steps of the gait at it."""
+    """Bifurcation on a branch: the index of the last point before it, its kind and value, and the steps of its gait."""
 
     after: int
     kind: str
@@ -128,7 +126,10 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return, in a list, the flip where a branch begins, with its gait taken twice. It is empty without a flip."""
+    """Return a list with the flip where a branch begins, or an empty list if it does not begin at a flip.
+
+    The steps of the flip's gait are in it twice in a row, because gaits of the branch have twice as many.
+    """
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:

@@ -48,7 +48,6 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
     """
     file = read_data(config)
-    block = file.block
     gait = inputs["fixedpoint"].summary
     for doubt in file.doubts():
         progress.note(doubt)
@@ -58,7 +57,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
         return progress.advance
 
     def ask(measured: MeasuredWalk) -> Identification:
-        return identify_walk(cast("Config", config), measured, gait, block, progress.note, begin)
+        return identify_walk(cast("Config", config), measured, gait, file.block, progress.note, begin)
 
     result = identify_divided(file, ask)
     content = content_of(config, result)
@@ -185,9 +184,8 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
     }
     groups = {"estimates": rows_group(estimates, LABELS, "row", "row"), "steps": step_group(result)}
-    groups["covariance"] = Group(
-        {"covariance": Variable(known.covariance, ("row", "column"), "1", "covariance, in the keys' units")}
-    )
+    covariance = Variable(known.covariance, ("row", "column"), "1", "covariance, in the keys' units")
+    groups["covariance"] = Group({"covariance": covariance})
     moves = worst_moves(known)
     if moves is not None:
         meaning = "standard deviations of the two worst-determined combinations, in the keys' units, the worst first"

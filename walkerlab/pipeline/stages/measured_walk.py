@@ -47,7 +47,8 @@ if TYPE_CHECKING:
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
-MAX_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
+# Each step adds an unknown floor height, and computing time grows as the cube of the number of steps.
+MAX_STEPS: Final = 500
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad; smaller changes of the sum of leg angles at heel strike do not count
@@ -55,9 +56,7 @@ SAME_TOUCHES: Final = 0.002  # rad; smaller changes of the sum of leg angles at 
 
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the data file's content, so that a changed file makes results outdated."""
-    if config.identify is None:
-        return {}
-    return {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
+    return {} if config.identify is None else {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
 
 
 class MeasuredFile:
@@ -118,7 +117,7 @@ class MeasuredFile:
         return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
 
     def doubts(self) -> tuple[str, ...]:
-        """Say in sentences what is odd about the angles, and how this was handled."""
+        """Describe, in a sentence for each finding, what is odd about the angles and how it was handled."""
         if self.steps is not None:
             return ()
         try:
@@ -152,7 +151,8 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
         raise ConfigError(
-            f"{block.data} is from {recording.levelled_by}, which levels the floor, so the slope turns the angles.",
+            f"{block.data} is from {recording.levelled_by}, which rotates its data until the floor is level. So "
+            "the angles from the vertical depend on the slope, which is to be estimated.",
             "Give --camera-tilt floor, or --camera-tilt 0 if the recording's floor_angle was 0.",
             ("identify", "camera_tilt_deg"),
         )

@@ -1,5 +1,6 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -8,7 +9,7 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config import analyses, identify, reads, schema
+from walkerlab.config import analyses, identify, reads
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.estimation import fit, measurements, mixed_model, prediction, result
 from walkerlab.physics.estimation.information import information_from, open_combinations
@@ -32,8 +33,8 @@ def run(config: reads.PlanConfig, inputs: Mapping[str, Content], progress: Progr
     progress.start("plan")
     if block.data:
         progress.note(f"a plan needs no measured walk: {block.data} is not read")
-    gait = inputs["fixedpoint"].summary
-    options = plan_measurements(cast("schema.Config", config), gait, block, plan, progress.note)
+    subject = find_model_gait(block.model, config, inputs["fixedpoint"].summary, progress.note)
+    options = plan_measurements(subject, block, plan)
     keys = tuple(options[0].errors)
     units = {key: parameter.parameter_of(key, config).unit for key in keys}
     determining = next((option for option in options if None not in option.errors.values()), None)
@@ -132,20 +133,12 @@ class WayToMeasure:
 
 
 def plan_measurements(
-    config: schema.Config,
-    gait: Mapping[str, Any],
-    question: identify.Identify,
-    plan: analyses.Plan,
-    note: Callable[[str], None] = lambda _: None,
+    subject: ModelUnderTest, question: identify.Identify, plan: analyses.Plan
 ) -> tuple[WayToMeasure, ...]:
     """Compute the parameter errors that would remain after each way of measuring a walk, simple ways first.
 
-    gait  summary of `fixedpoint` for the config
-    note  receives messages
-
     Raises NoAnswer if the model's walk ends early, ConfigError for keys that are not parameters.
     """
-    subject = find_model_gait(question.model, config, gait, note)
     options = []
     for start, change in ((AT_GAIT, 0.0), (OFF_GAIT, plan.start_change)):
         moved = replace(subject, z=subject.z * (1.0 + change))
@@ -222,8 +215,8 @@ def walk_of(subject: ModelUnderTest, measured: measurements.MeasuredWalk, questi
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: analyses.Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain if `measured` quantities of the first steps are known, and which combinations are
-    open."""
+    """Return the standard errors of the parameters if `measured` quantities of the first steps are known, and the
+    combinations that stay undetermined."""
     noise = {
         measurements.STEP_PERIOD: plan.period_noise_s,
         measurements.STEP_LENGTH: plan.length_noise_m,
@@ -248,11 +241,5 @@ def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], mo
         error = errors_after(count)[0].get(key)
         return error is not None and error <= wanted
 
-    if not suffices(most):
-        return None
     # More steps never increase an error.
-    low, high = 0, most
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if suffices(middle) else (middle, high)
-    return high
+    return bisect_left(range(most), True, 1, key=suffices) if suffices(most) else None

@@ -80,7 +80,7 @@ def read_artifact(path: Path) -> Recording:
         ) from None
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:
-        raise ConfigError(f"{path} contains no walk over time.", "Run it with outputs: [states, energies, forces].")
+        raise ConfigError(f"{path} contains no samples of a walk.", "Run it with outputs: [states, energies, forces].")
     columns = {TIME: np.asarray(group["time"], float)}
     units = {TIME: "s"}
     for name, variable in group.variables.items():
@@ -101,11 +101,10 @@ def content_of(
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
     columns = step_columns(steps.touch_time_s, period_s=periods, length_m=steps.length_m, touch_along_m=along)
-    swing = steps.step % 2
     samples: dict[str, Any] = {
         "time": steps.time_s,
         "step": steps.step,
-        "stance_leg": 2 - swing,
+        "stance_leg": 2 - steps.step % 2,
         "angle": steps.angle_rad,
         "velocity": steps.velocity_rad_s,
         **resample_others(walk, steps),
@@ -128,9 +127,8 @@ def content_of(
         "columns": walk.sources,
         "doubts": [*doubts],
     }
-    return Content(
-        {"steps": Group(columns), "trajectory": Group({**variables_over_time(**samples), **leg_labels()})}, summary
-    )
+    trajectory = Group({**variables_over_time(**samples), **leg_labels()})
+    return Content({"steps": Group(columns), "trajectory": trajectory}, summary)
 
 
 def resample_others(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:

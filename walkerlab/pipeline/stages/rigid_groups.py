@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
-from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, compute_in_turns, energy_at_touch
+from walkerlab.physics.mechanics.rigid_model import STANCE, compute_in_turns, energy_at_touch
 from walkerlab.pipeline.stages.walk import COORDINATE, leg_labels, rotation_variables, steps_of, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
@@ -18,18 +18,14 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     if walk.steps:
         set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
         turned = set_down - walk.before[:, STANCE]
-        rolling = compute_in_turns(scene.walker, np.arange(walk.steps), rolled_distance, turned)
+        # While its leg turns back by an angle, the stance foot rolls by that angle times its radius.
+        rolling = compute_in_turns(scene.walker, np.arange(walk.steps), lambda leg, angle: leg.radius * angle, turned)
         columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
         names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
         stored["steps"] = Group({**columns, COORDINATE: names})
     if walk.samples is not None and walk.samples.time_s.size:
         stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
     return stored
-
-
-def rolled_distance(walker: RigidModel, turned: Any) -> Any:
-    """Return how far (m) the stance foot has rolled when its leg has turned back by the angles `turned`."""
-    return walker.radius * turned
 
 
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
@@ -93,9 +89,8 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
 
 def place_variables(positions: Places, stance: Any) -> dict[str, Variable]:
     """Return positions of hip, knees and feet, along the slope from the first foothold and above the slope."""
-    points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
-        {} if positions.knees is None else {"knee": positions.knees}
-    )
+    points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)}
+    points |= {} if positions.knees is None else {"knee": positions.knees}
     variables = variables_over_time(hip_along_m=positions.hip[:, 0], hip_height_m=positions.hip[:, 1])
     for name, point in points.items():
         along, height = (reorder_by_leg(point[:, :, axis], stance) for axis in range(2))

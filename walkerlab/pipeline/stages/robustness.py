@@ -1,6 +1,6 @@
 """Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any, Final
@@ -82,7 +82,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "mean_steps": Label("1", "mean number of steps to failure, or a lower bound"),
         "walks": Label("1", "walks"),
         "capped": Label("1", "walks stopped at the maximum number of steps"),
-        "method": Label("", "method of the mean"),
+        "method": Label("", "how the mean was estimated"),
     },
     "sensitivity": {
         "of": Label("", "quantity of the gait"),
@@ -121,7 +121,8 @@ def run(
         numbers = gait_quantities(gait)
         assert numbers is not None, "a gait has quantities"
         answer["gaits"].append({"model": subject.model, **numbers})
-        answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
+        keys = parameters_read(subject, config.robustness.to)
+        answer["sensitivity"] += sensitivities(subject, keys, numbers, progress, jobs_but_for_walks)
         # An unstable gait survives no disturbance.
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
@@ -181,9 +182,8 @@ def refuse(config: RobustnessConfig) -> None:
 
 def subjects(config: RobustnessConfig, inputs: Mapping[str, Content], progress: Progress) -> Iterator[ModelUnderTest]:
     progress.start("robustness: gaits")
-    gait = inputs["fixedpoint"].summary
     for model in models_of(config):
-        yield find_model_gait(model, config, gait, progress.note)
+        yield find_model_gait(model, config, inputs["fixedpoint"].summary, progress.note)
 
 
 def models_of(config: RobustnessConfig) -> tuple[str, ...]:
@@ -281,9 +281,8 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
     gait = inputs["fixedpoint"].summary
     _, *heights = rough_heights(max(config.robustness.roughness_m), (config.seed, 0), STEPS_DRAWN).tolist()
     scene = rigid_scene(config, Footholds(heights_m=tuple(heights)), ("states",))
-    walk = scene.walk(
-        as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=float(gait["step_length_m"])
-    )
+    length = float(gait["step_length_m"])
+    walk = scene.walk(as_state(gait["state"]), STEPS_DRAWN, EXACT_STEPS, sampled=True, step_length=length)
     return {f"rough_walk/{name}": group for name, group in groups_of_walk(scene, walk).items()}
 
 
@@ -292,21 +291,15 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
     most = cap(model, config)
     rows = []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
-        seen = asdict(rough_walks(counts, most))
-        measures = {name: value for name, value in seen.items() if value is not None}
+        measures = {name: value for name, value in asdict(rough_walks(counts, most)).items() if value is not None}
         rows.append({"model": model, "roughness_m": roughness, **measures, "cut_off_at": most})
     return rows
 
 
 def sensitivities(
-    subject: ModelUnderTest,
-    requested: tuple[str, ...] | None,
-    numbers: Mapping[str, float],
-    progress: Progress,
-    jobs: int,
+    subject: ModelUnderTest, keys: Sequence[str], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
     """Return rows of derivatives in order of decreasing relative effect. Parameters with value 0 come last."""
-    keys = parameters_read(subject, requested)
     label = f"robustness: gradients of the {subject.model} model"
     rows = list[dict[str, Any]]()
     results = map_in_order([partial(gradients_of, subject, key) for key in keys], jobs)
@@ -334,7 +327,7 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
 
 
 def parameters_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, of those requested or, if `requested` is None, of
+    """Return the dotted keys of the parameters that the model reads, among those `requested` or, if that is None, among
     all."""
     selection = parameter_keys(subject.config) if requested is None else requested
     return tuple(key for key in selection if model_reads(subject.model, subject.config, key))

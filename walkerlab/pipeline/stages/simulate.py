@@ -31,9 +31,8 @@ def run(config: reads.SimulateConfig, inputs: Mapping[str, Content], progress: P
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
         return scene.walk(start, steps, tolerances, sampled, progress.advance, reference)
 
-    of_scene = partial(groups, scene)
-    of_config = partial(summary, config)
-    return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
+    stored = partial(groups, scene)
+    return content_of_walk("simulate", walk, tolerances, stored, partial(summary, config), progress, again)
 
 
 def summary(config: reads.SimulateConfig, walk: RigidWalkResult) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dic
     later = steps_later(first, second)
     for key, name in ERROR_OF_EACH_STEP.items():
         apart = step_changes(first.get(key) or (), second.get(key) or (), first.get("repeats_after") or 0, later)
-        if np.isfinite(apart).any() and any(first[key]):  # point feet have only zeros
+        if np.isfinite(apart).any() and any(first[key]):  # for point feet, all values are zero
             changes[name] = float(np.nanmax(apart))
             of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
     changes["end_time_s"] = abs(first["end_time_s"] - second["end_time_s"])
@@ -116,7 +116,8 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
         return largest
     end = count - 1 - (later or 0)
     steps = np.arange(count)
-    last = end - (end - steps) % period  # the last step that the second walk has, too
+    # for each step, the last one at the same place in the cycle that has a counterpart in the second walk
+    last = end - (end - steps) % period
     between = changes[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
 
@@ -127,9 +128,9 @@ def evenly_spread(count: int, wanted: int) -> list[int]:
 
 
 FIRST_STEPS = 200
-"""Number of steps at the start of a walk of which every sample is stored."""
+"""Every sample is stored for this many steps at the start of a walk."""
 LAST_STEPS = 20
-"""Number of steps at the end of a walk of which every sample is stored."""
+"""Every sample is stored for this many steps at the end of a walk."""
 MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 MIN_REPEATED = 4
@@ -137,12 +138,12 @@ MIN_REPEATED = 4
 MAX_REPEATED = 32
 """Number of steps at the end of a walk that are tested for repetition, or a quarter of all steps if that is more."""
 FEWEST_SETTLED = 8
-"""Minimum number of last steps in which repetition is looked for."""
+"""Minimum number of steps, at the end of a walk, that are tested for repetition. Shorter walks are tested whole."""
 REPEATED = 1e-5
 """Steps repeat if they differ by less than this, as a fraction of the first step."""
 REPEATED_AFTER_SETTLING = 1e-2
-"""If steps repeat only after two or more, they must also differ by less than this, relative to the spread of the steps.
-"""
+"""If the period of repetition is two or more steps, the difference must also be less than this fraction of the spread
+of the steps."""
 ON_GAIT = 1e-6
 """A walk starts on a gait if its second step differs from the first by less than this (relative)."""
 OFF_GAIT = 1e-2
@@ -158,7 +159,7 @@ STEP_LABELS: Final = {
     "period_s": Label("s", "time from touch to touch"),
     "length_m": Label("m", "distance along the slope from touch to touch"),
     "touch_along_m": Label("m", "position of the touch along the slope from the first foothold"),
-    UNEVEN: Label("m", "height above the slope of the foothold that is touched"),
+    UNEVEN: Label("m", "height of the touched foothold above the slope"),
     "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
     "slip_m": Label("m", "net material slip of the stance foot from its touch to its lift"),
     "rolling_m": Label("m", "rolling distance of the stance foot from its touch to its lift"),
@@ -270,9 +271,8 @@ def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) ->
     between = np.flatnonzero(~stored)
     stored[between[:: max(1, -(-between.size // MAX_BETWEEN))]] = True
     progress.note(
-        f"{ends.size} steps: of {step.size} samples {np.count_nonzero(stored)} are stored, all of the first "
-        f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between; both sides of every heel strike are "
-        "among them"
+        f"{ends.size} steps: {np.count_nonzero(stored)} of {step.size} samples are stored: all of the first "
+        f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between, and both sides of every heel strike"
     )
     return select_samples(samples, stored)
 
@@ -385,7 +385,7 @@ def steps_to_repeat(steps: Floats) -> int:
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         difference = np.abs(steps[period:] - steps[:-period]).max()
-        # A walk that alternates about its limit and settles slowly almost repeats after two steps, but is no cycle.
+        # A slowly settling walk that alternates about its limit nearly repeats every two steps, but it is not a cycle.
         if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0
@@ -421,10 +421,9 @@ def last_stride(walk: WalkRecord) -> dict[str, Any]:
         return {}
     count = walk.steps - walk.steps % STRIDE  # even, because leg 1 swings in the first step of a stride
     periods, lengths = (values[count - STRIDE : count].tolist() for values in (walk.periods_s, walk.lengths_m))
+    steps = zip(periods, lengths, strict=True)
     return {
-        "gait_steps": [
-            {"period_s": period, "length_m": length} for period, length in zip(periods, lengths, strict=True)
-        ],
+        "gait_steps": [{"period_s": period, "length_m": length} for period, length in steps],
         "step_period_s": sum(periods) / STRIDE,
         "step_length_m": sum(lengths) / STRIDE,
         "asymmetry": {"step_length": asymmetry_of(*lengths), "step_period": asymmetry_of(*periods)},

@@ -252,15 +252,8 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
     facts = {name: json.loads(value) if name in NESTED else value for name, value in root.items()}
     identity = Identity(**{one.name: facts[one.name] for one in fields(Identity)})
     provenance = Provenance(**{one.name: facts[one.name] for one in fields(Provenance) if one.name in facts})
-    artifact = Stored(
-        groups,
-        json.loads(root["summary_json"]),
-        tuple(json.loads(root["summary_timed"])),
-        identity=identity,
-        provenance=provenance,
-        complete=root["complete"],
-        seal=seal,
-    )
+    parts = groups, json.loads(root["summary_json"]), tuple(json.loads(root["summary_timed"]))
+    artifact = Stored(*parts, complete=root["complete"], identity=identity, provenance=provenance, seal=seal)
     if artifact.digest() != root["content_digest"]:
         raise Damaged("its content does not match its stored digest")
     if identity.key != root["stage_key"]:

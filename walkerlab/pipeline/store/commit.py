@@ -15,8 +15,8 @@ SHIPPED = ("walkerlab", "configs")
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, followed by '-dirty' if package files have changed, or None if it is no
-    checkout."""
+    """Return the commit of a source tree, followed by '-dirty' if package files have changed, or None if it is not
+    a checkout."""
     # Without this check, git would report the commit of another checkout that contains the environment.
     if not (root / ".git").exists():
         return None

@@ -188,17 +188,16 @@ def canonical(values: ArrayLike) -> NDArray[Any]:
     Raises TypeError for other types.
     """
     array: NDArray[Any] = np.asarray(values)
-    result: NDArray[Any]
     kind = array.dtype.kind
     if kind in STORED_AS:
-        result = array.astype(STORED_AS[kind], order="C", casting="safe")
+        array = array.astype(STORED_AS[kind], order="C", casting="safe")
     elif kind in "UTO" and all(isinstance(item, str) for item in array.ravel().tolist()):
-        result = array.astype(object, order="C")
-        check_text(*result.ravel().tolist())
+        array = array.astype(object, order="C")
+        check_text(*array.ravel().tolist())
     else:
         raise TypeError(f"cannot store values of type {array.dtype}: float, integer, bool or text only")
-    result.setflags(write=False)
-    return result
+    array.setflags(write=False)
+    return array
 
 
 def check_text(*texts: str) -> None:

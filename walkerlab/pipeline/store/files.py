@@ -107,8 +107,7 @@ def write_through(path: Path, data: bytes) -> None:
     Links are followed, never replaced. Raises StorageError if the file cannot be written.
     """
     with storing(path):
-        special = path.exists() and not stat.S_ISREG(path.stat().st_mode)
-        if special:
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):
             path.write_bytes(data)
             return
     write_atomically(path.resolve(), data)
@@ -173,20 +172,18 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # `read` allocates memory for the requested size, so it must not be the limit.
+        # `read` allocates memory for the size requested, so request the size of the file, not the limit.
         return file.read(status.st_size)
 
 
 def file_digest(path: Path) -> str | None:
     """Return the sha256 of a file, or None if it cannot be read. Pipes and devices are not read, as they might never
     end."""
-    try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return None
+    with contextlib.suppress(OSError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+    return None
 
 
 def remove_leftovers(folder: Path) -> list[Path]:
@@ -199,7 +196,7 @@ def remove_leftovers(folder: Path) -> list[Path]:
 
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""Pattern of texts that a spreadsheet would evaluate, by their first character."""
+"""Pattern of the first character of texts that a spreadsheet would evaluate as formulas."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 

@@ -72,11 +72,8 @@ class VariablesOnDisk(Mapping[str, Variable]):
         with h5py.File(file) as opened:
             members = {name: opened[name] for name in sorted(opened)}
             self._by_address = names_of(members)
-            self._names = [
-                name
-                for name, member in members.items()
-                if isinstance(member, h5py.Dataset) and not is_bare_dimension(member)
-            ]
+            datasets = {name: member for name, member in members.items() if isinstance(member, h5py.Dataset)}
+            self._names = [name for name, dataset in datasets.items() if not is_bare_dimension(dataset)]
         self._read = lru_cache(maxsize=8)(self._read_anew)
 
     def __getitem__(self, name: str) -> Variable:
@@ -139,7 +136,7 @@ def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
 
 
 def write_attributes(holder: Any, attributes: Mapping[str, Attribute]) -> None:
-    """Write attributes in order. Text is stored as UTF-8 of fixed length, as in every netCDF file."""
+    """Write attributes in order. Text is stored as UTF-8 of fixed length, like netCDF's ordinary text attributes."""
     for name, value in attributes.items():
         if isinstance(value, str):
             data = value.encode()
@@ -192,10 +189,8 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
             yield from walk_groups(member, f"{path}/{name}" if path else name, budget)
         elif not is_bare_dimension(member):
             variables[name] = read_variable(name, member, names, budget)
-    if path:
-        yield path, Group(variables, read_attributes(parent))
-    elif variables:
-        yield path, Group(variables)
+    if path or variables:
+        yield path, Group(variables, read_attributes(parent) if path else {})
 
 
 def is_bare_dimension(dataset: Any) -> bool:
@@ -203,15 +198,15 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Return the names of a group's members by their addresses, because HDF5 would search the whole file for such a
-    name."""
+    """Map the address of each of a group's members to its name. HDF5 would search the whole file to find the name for
+    an address."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
     """Read one array with its labels. `names` maps the addresses of the group's members to their names."""
     values = read_values(name, dataset, budget)
-    if read_text(dataset, "dtype", "") == "bool":
+    if "dtype" in dataset.attrs and read_text(dataset, "dtype") == "bool":
         values = values.astype(np.bool_)
     scales = [] if dataset.is_scale else [h5py.h5o.get_info(axis[0].id).addr for axis in dataset.dims]
     if not all(scale in names for scale in scales):
@@ -249,9 +244,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     texts = np.asarray(dataset[()])
     # Equal strings share one object, because a short string takes far more memory here than in the file.
     decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
-    values = np.empty(texts.shape, dtype=object)
-    values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]
-    return values
+    return np.array([decoded[text] for text in texts.ravel().tolist()], object).reshape(texts.shape)
 
 
 def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
@@ -285,10 +278,8 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
     return attributes
 
 
-def read_text(holder: Any, name: str, default: str | None = None) -> str:
-    """Read a text attribute, and return `default` if it is absent."""
-    if default is not None and name not in holder.attrs:
-        return default
+def read_text(holder: Any, name: str) -> str:
+    """Read a text attribute."""
     value = holder.attrs[name]
     if isinstance(value, bytes):
         return value.decode()

@@ -1,5 +1,6 @@
 """Record the provenance of results: software, machine, time and command. A result's key does not depend on it."""
 
+import contextlib
 import datetime
 import importlib.metadata
 import platform
@@ -80,10 +81,8 @@ def library_versions() -> dict[str, str]:
     imported."""
     versions = {}
     for name in LIBRARIES:
-        try:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            continue
     return versions | {f"extension {found.name}": found.origin for found in external_extensions() if found.extension}
 
 

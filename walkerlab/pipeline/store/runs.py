@@ -204,11 +204,10 @@ def stored_in(folder: RunFolder) -> list[str]:
 
 def config_of(folder: RunFolder) -> schema.Config | None:
     """Return the config of a run, or None if it is unknown or this version's schema rejects it."""
-    try:
+    with contextlib.suppress(ConfigError):
         tree = read_text(config_text(folder) or "", "stored config")
         return validation.validate_tree(tree) if isinstance(tree, BlockNode) else None
-    except ConfigError:
-        return None
+    return None
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
@@ -253,7 +252,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 
 
 def claim(folder: RunFolder, config: schema.Config) -> None:
-    """Record in a folder to which config its results belong. Call this under the lock, before any result is written.
+    """Record in a folder which config its results belong to. Call this under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config` does.
     """
@@ -296,7 +295,7 @@ def is_of_same_config_file(record: Record, folder: RunFolder) -> bool:
 
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
-"""Patterns of the files that drawing stages write, for the case that the index of these files is lost."""
+"""Patterns of the files that drawing stages write, in case the index of these files is lost."""
 CHUNKS = "sweep-chunks"
 FIGURES_FOLDER = "figures"
 UNFINISHED = (TEMPORARY, f"{FIGURES_FOLDER}/{TEMPORARY}", f"{CHUNKS}/{TEMPORARY}")

@@ -96,9 +96,8 @@ def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
 
 def chunk_of(key: str, answer: Content) -> Chunk:
     """Convert a stage's answer to a chunk of one point."""
-    numbers = json.dumps(
-        flatten_summary(remove_timings(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":")
-    )
+    summary = flatten_summary(remove_timings(answer.summary, answer.timed))
+    numbers = json.dumps(summary, allow_nan=False, separators=(",", ":"))
     status: Status = "answered" if answer.no_answer is None else "no-answer"
     reason = "" if answer.no_answer is None else answer.no_answer.message
     return Chunk((PointResult(key, status, reason, numbers),), labels_in(answer))

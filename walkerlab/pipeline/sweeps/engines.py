@@ -27,16 +27,16 @@ LISTING_S: Final = 5.0
 RESULT_S: Final = 30.0
 """Time after a job's end in which its result may still appear on a network disk."""
 RESTART_S: Final = 20.0
-"""Time without a worker after which workers are started again. Dask needs some seconds to replace one by itself."""
+"""Time without a worker after which workers are started again. On its own, Dask takes some seconds to replace one."""
 SILENT_WORKER_S: Final = 600.0
-"""If Slurm's queue has not answered for this time, its jobs count as lost."""
+"""If Slurm's queue has not answered for this long, its jobs count as lost."""
 GONE = "gone"
 SILENT = "silent"
 ENDED_STATES: Final = {
     "BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
     "TIMEOUT", GONE, SILENT,
 }  # fmt: skip
-"""States in which a Slurm job does not run any more."""
+"""States of a Slurm job that is no longer running."""
 
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 
@@ -83,16 +83,14 @@ def local(options: EngineOptions) -> WorkerPool:
 def environment_of_workers() -> Iterator[None]:
     """Make processes that start in the `with` block use one thread and import nothing from the current folder."""
     changes = dict.fromkeys((*ONE_THREAD, "PYTHONSAFEPATH"), "1")
-    before = {name: os.environ.get(name) for name in changes}
+    before = {name: os.environ[name] for name in changes.keys() & os.environ.keys()}
     os.environ.update(changes)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in changes.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
 
 
 @contextlib.contextmanager
@@ -119,9 +117,8 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
         # computed again, as in every engine.
         size = options.workers or max(1, len(client.nthreads()))
         # By default, Dask gives equal calls the same result, so a second attempt would get the error of the first.
-        executor = JobExecutor(
-            functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
-        )
+        submit = functools.partial(client.submit, retries=0, pure=False)
+        executor = JobExecutor(submit, size, None if workers is None else workers.wait)
         try:
             yield executor
         finally:
@@ -129,7 +126,10 @@ def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
 
 
 class DaskWorkers:
-    """Workers of a cluster that this process started. Dask does not always replace one that it ended for its memory."""
+    """Workers of a cluster that this process started.
+
+    Dask does not always replace a worker that it killed for using too much memory.
+    """
 
     def __init__(self, cluster: Any, client: Any, count: int) -> None:
         self.cluster = cluster
@@ -139,7 +139,7 @@ class DaskWorkers:
         self._seen_at = time.monotonic()  # last time at which there was a worker
 
     def wait(self, job: Any) -> None:
-        """Wait until a job has ended, and start the workers again if there has been none for a while."""
+        """Wait until a job has ended. If the cluster has had no worker for a while, start its workers again."""
         while not job.done():
             with contextlib.suppress(TimeoutError):
                 extra("distributed", "dask").wait(job, timeout=LISTING_S)
@@ -158,14 +158,13 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", options)
-    # Options come as texts, but submitit refuses numbers in the form of text.
+    # Options arrive as strings, but submitit rejects numbers given as strings.
     parameters: dict[str, Any] = {name: number_or_text(text) for name, text in options.options.items()}
     cluster = str(parameters.pop("cluster", "slurm"))
     python = parameters.pop("python", None)
+    interpreter = {"slurm_python": python} if python else {}
     try:
-        job_runner = submitit.AutoExecutor(
-            private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
-        )
+        job_runner = submitit.AutoExecutor(private_jobs_folder(options.folder), cluster=cluster, **interpreter)
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
     # submitit checks the types of options by assertions.
     except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
@@ -201,20 +200,20 @@ def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
     try:
         return fn(*args)
     finally:
-        for number in numbers:  # a second signal must not prevent that the result is stored
+        for number in numbers:  # a second signal must not prevent the result from being stored
             signal.signal(number, signal.SIG_IGN)
 
 
 class SlurmQueue:
-    """States of this user's Slurm jobs, read from the queue. submitit only asks for the accounting, which few clusters
-    keep."""
+    """States of this user's Slurm jobs, read from the queue. submitit queries only Slurm's accounting database, which
+    many clusters lack."""
 
     def __init__(self, time_limit: str) -> None:
         """Store the time limit of the jobs (min). Slurm is not queried before a state is needed."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
-        # The last query seems long ago, so that the first call of `state` queries Slurm without waiting.
+        # Start as if the last query were long ago, so that the first call of `state` queries Slurm without waiting.
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:
@@ -235,14 +234,14 @@ class SlurmQueue:
     def state(self, job_id: str, submitted: float) -> str:
         """Return the state of a job that was submitted at time `submitted` of the monotonic clock.
 
-        GONE means that the queue no longer lists the job, SILENT that Slurm has not answered for long, and UNKNOWN that
-        there is no list yet that may hold the job.
+        GONE means that the queue no longer lists the job, SILENT that Slurm has not answered for a long time, and
+        UNKNOWN that the last query failed or was made before the job was submitted.
         """
         with self._lock:
             now = time.monotonic()
             if now - self._listed_at >= LISTING_S:
                 self._listed_at = now
-                # `all`, because the list then has finished jobs, too, for some minutes
+                # With `all`, the list also shows finished jobs for some minutes.
                 command = ["squeue", "--noheader", "--me", "--states=all", "--format=%i %T"]
                 done = subprocess.run(command, capture_output=True, text=True, check=False)
                 if done.returncode == 0:
@@ -307,11 +306,9 @@ class JobExecutor(SizedExecutor):
             try:
                 if self._wait_for is not None:
                     self._wait_for(job)
-                result = job.result()
+                future.set_result(job.result())
             except BaseException as error:  # the error of a cancelled job need not be an Exception
                 future.set_exception(error)
-            else:
-                future.set_result(result)
             self.jobs.discard(job)
 
         threading.Thread(target=wait, daemon=True).start()

@@ -276,8 +276,7 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
     for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):
             quantities = QUANTITIES[question.stage]
-            near = problems.nearest(name, (*quantities, *question.names))
+            hint = problems.suggestion(name, (*quantities, *question.names))
             shown = (quantity for quantity in quantities if quantity != "outcome")
             listed = ", ".join(quantity + "…" if quantity.endswith(".") else quantity for quantity in shown)
-            hint = f" Did you mean {near}?" if near else ""
             raise ConfigError(f"{option}: {question.stage} has no such quantity.{hint}", f"Choose from {listed}.")

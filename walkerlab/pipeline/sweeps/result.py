@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walkerlab.config.schema import Config
 from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, axis_label, unit_by_name
 from walkerlab.physics.solvers.system import Integers
-from walkerlab.pipeline.headlines import LAST_STEP_SOURCES, headlines
+from walkerlab.pipeline.headlines import headlines, last_step_values
 from walkerlab.pipeline.store import artifact, files, hdf5
 from walkerlab.pipeline.store.content import Content, Variable
 from walkerlab.pipeline.sweeps.chunk import Chunk
@@ -31,7 +31,8 @@ STATUS_TEXTS: Final = {
 """Columns that every point has in addition to the stage's quantities."""
 STATE_NAMES: Final = ("state", "start_state", "final_state")
 MAX_REASON: Final = 500
-"""Maximum length of a reason. Text in files has a fixed length, so a long reason would take its room at every point."""
+"""Maximum length of a reason. Text in files has a fixed length, so one long reason would take up space at every point.
+"""
 
 
 class SweepVariable:
@@ -109,10 +110,7 @@ class Merge:
             numbers = json.loads(row.numbers)
             reason = row.reason if len(row.reason) <= MAX_REASON else f"{row.reason[: MAX_REASON - 1]}…"
             own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": reason}
-            last = {
-                name: numbers[list_name][-1] for name, list_name in LAST_STEP_SOURCES.items() if list_name in numbers
-            }
-            rows.append({**numbers, **last, **own})
+            rows.append({**numbers, **last_step_values(numbers), **own})
         self.has_row[indices] = True
         for name in dict.fromkeys(chain.from_iterable(rows)):
             have = [k for k, row in enumerate(rows) if name in row]
@@ -161,8 +159,6 @@ class Merge:
 
     def endings(self) -> list[dict[str, Any]]:
         """Describe how walks ended, and whether the ground is why. Return [] for a stage that simulates no walk."""
-        question = self.question
-        config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
         pads = None
         pitch = self.values_of("pitch_m")
@@ -171,10 +167,10 @@ class Merge:
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_numbers(lengths[off])
             steps = last[np.isfinite(last)]
-            varied = PAD_PITCH in (axis.key for axis in question.axes)
-            laid = "" if config.contact is None or varied else config.contact.pad_pitch
+            varied = PAD_PITCH in (axis.key for axis in self.question.axes)
+            laid = "" if self.config.contact is None or varied else self.config.contact.pad_pitch
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
-        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT_STAGE, pads)
+        return describe_endings(count_texts(outcomes), self.config, self.question.stage == CONTACT_STAGE, pads)
 
     def numerical_error(self) -> dict[str, Any]:
         """Return the largest errors of the repeated walks, and under `ended_otherwise`, how many of them ended
@@ -191,7 +187,7 @@ class Merge:
         return {"numerical_error": counts | largest}
 
     def variable(self, name: str) -> Variable:
-        """Return a variable over the points, and remove its column, because a second copy would take much memory."""
+        """Return a variable over the points and remove its column, because a second copy would take a lot of memory."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]
@@ -241,12 +237,11 @@ def count_texts(texts: NDArray[Any]) -> dict[str, int]:
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     """Format a CSV table of the points: parameters, outcome and headline quantities or, if `every` is true, all
     values."""
-    group = content[""]
     dimensions = len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
-    variables = dict(group.variables)
+    variables = dict(content[""].variables)
     if not every:
         scalars = (name for name, variable in variables.items() if len(variable.dims) == dimensions)
         shown_names = ("outcome", *headlines(question.stage, scalars), "reason")
@@ -260,9 +255,8 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
     """Split a variable into columns, one for each entry of a list. Missing values are ''."""
     values = variable.values
-    points = values.shape[:dimensions]
     inner_shape = values.shape[dimensions:]
-    rows = values.reshape((int(np.prod(points)), *inner_shape))
+    rows = values.reshape((int(np.prod(values.shape[:dimensions])), *inner_shape))
     for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)

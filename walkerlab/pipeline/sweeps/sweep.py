@@ -157,7 +157,7 @@ class SweepRun:
         count = len(self.question)
         reporter = reporter or Silent()
         for key in unread_keys(self):
-            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
+            reporter.note(f"sweep: {self.question.stage} does not read {key}, so its results do not depend on it")
         files.make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
             runs.claim(self.folder, self.loaded.config)
@@ -199,11 +199,9 @@ class SweepRun:
             return ()
         bugs: dict[str, str] = {}
         progress.start("sweep", int(missing.size))
-        stage = self.question.stage
-        digest = self.code_digest
 
         def keep(chunk: Chunk) -> None:
-            store(self.folder, stage, digest, chunk, origin)
+            store(self.folder, self.question.stage, self.code_digest, chunk, origin)
             merge.put(chunk, self.places)
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
@@ -228,7 +226,6 @@ class SweepRun:
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
         """Yield the points to compute. The walks of a sample of them are repeated to measure the numerical error."""
         stage = self.question.stage
-        graph = self.keys.graph
         # Workers keep inputs between chunks. Because of the new token, a forced sweep does not reuse those of earlier
         # sweeps.
         forced = token_hex() if work.force else ""
@@ -236,9 +233,8 @@ class SweepRun:
         for index in indices:
             config = self.config(index)
             key = self.keys.compute_keys(config, stage)[stage]
-            yield WorkUnit(
-                key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced, versions())
-            )
+            run = partial(compute_point, config, key, self.keys.graph, stage, index in sample, forced, versions())
+            yield WorkUnit(key, 1, run)
 
 
 def checked_keys(run: SweepRun) -> list[bytes]:

@@ -59,7 +59,7 @@ class Simulation(ABC):
     ) -> None:
         """Build the model in its start state.
 
-        q, v    coordinates (m, rad) and velocities: first the freedoms of the base, then the hinges
+        q, v    coordinates (m, rad) and velocities: first the degrees of freedom of the base, then the hinges
         forces  external forces on the walker, or None
         own     native ground contact of the engine, or None
         """

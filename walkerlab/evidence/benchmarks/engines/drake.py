@@ -117,7 +117,7 @@ class DrakeRun(adapter.Simulation):
         remaining = [steps]
 
         def monitor(root: Any) -> Any:
-            # Drake calls monitors also when the simulator is initialised, which is no step.
+            # Drake also calls monitors when the simulator is initialised, which is not a step.
             if root.get_time() <= 0.0:
                 return EventStatus.DidNothing()
             remaining[0] -= 1
@@ -184,7 +184,10 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world by a joint for each freedom. Return the joints."""
+    """Join a link to its parent by a hinge, or the base to the world by joints for its degrees of freedom.
+
+    Returns the joints.
+    """
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 

@@ -1,7 +1,7 @@
 """Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, contact of balls with a triangle.
 
 The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d' with the k and e of ADAMS's law. Friction
-rises linearly with the slip velocity until it is full.
+rises linearly with the slip velocity up to its full value.
 
 Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
 """
@@ -127,7 +127,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
         for freedom in freedoms:
-            # Each freedom of the base needs a separate link. Only the last of these links may have the mass.
+            # Each degree of freedom of the base needs a separate link. Only the last of these links may have mass.
             last = freedom == freedoms[-1]
             hangs = link.parent >= 0
             offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)

@@ -238,7 +238,7 @@ def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float,
     far = contact_state.farthest_slide(scene.ground.terrain)
     if abs(along - walk_state.foothold[foot]) <= far:
         return False
-    # A round foot moves away from its foothold also by rolling. Only motion of its material is sliding.
+    # A round foot also moves away from its foothold by rolling. It has slid only if its material has moved.
     y = tuple(scene.about_centre(q, v).tolist())
     material = contact_state.material_along(scene.ours.whole, foot, along, y)
     return bool(abs(material - walk_state.touched[foot]) > far)

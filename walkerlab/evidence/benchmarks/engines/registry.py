@@ -19,7 +19,7 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in the output, of the adapter module and of the distribution to install
+    name: str  # name of the engine in the output, and of its adapter module and the distribution to install
     module: str  # import name of its package
     core: str = ""  # distribution of the library itself, if it can be installed alone
 

@@ -49,7 +49,7 @@ class SwingRow:
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float, Label("1", "largest difference of the end state, rad and rad/s")]
     energy_drift_j: Annotated[float, Label("J", "change of the mechanical energy")]
-    order: Annotated[float | None, Label("1", "observed order, compared with the run with twice the step")]
+    order: Annotated[float | None, Label("1", "observed order, from this run and the one with twice the step")]
     wall_s: Annotated[float, RUN_TIME]
 
 

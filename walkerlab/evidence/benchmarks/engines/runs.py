@@ -46,7 +46,7 @@ class WalkTask:
     stepping: Stepping
     scene: EngineScene
     touches: int  # number of touches after which the walk ends
-    until_s: float  # time at which the walk ends at the latest
+    until_s: float  # latest time at which the walk ends
     own: OwnContact | None  # the engine's tuned contact, or None for our law
     max_steps: int  # step budget of the engine
 

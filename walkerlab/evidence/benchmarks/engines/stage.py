@@ -53,7 +53,7 @@ def supported_scene(
     points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
     if any(points) and not all(points):
         raise ConfigError(
-            "engines: one foot is a point, the other is round. A ball replaces the point and needs lower ground.",
+            "engines: a point foot and a round foot need ground at two heights, because a ball replaces the point.",
             f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)
@@ -228,7 +228,8 @@ def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
 
 def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
     """Return the largest step (s) with three correct digits of the last period, by experiment and name of series."""
-    # Under our law the digits are those of the reference. Native contact has no reference but the finest run.
+    # Under our law, correct digits are counted against the reference. Native contact has no reference, so they are
+    # counted against its finest run.
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
