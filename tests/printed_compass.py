@@ -37,8 +37,8 @@ def potential_energy(walker, theta_1, theta_2):
 
 
 def ground_reaction(walker, theta_1, theta_2, omega_1, omega_2):
-    """Return the force of the ground on the stance foot (N), along the slope (positive in walking direction) and normal
-    to it.
+    """Return the force of the ground on the stance foot (N), along the slope (positive in the walking direction) and
+    normal to it.
 
     Rows 3 and 4 of (6) with the foot held still: (A.11) to (A.16), (A.33) to (A.38).
     """

@@ -360,7 +360,7 @@ def identify(
     3.0
     """
     if isinstance(walk, Mapping):
-        # Columns are written to a file, so that they have the same checks and messages as a file.
+        # Write the columns to a file, so that they go through the same checks as a file and give the same messages.
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "walk.csv"
             path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))

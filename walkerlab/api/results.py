@@ -120,7 +120,7 @@ class Result:
         """Advice on what to try if there is no answer, otherwise empty.
 
         >>> find_gait(slope_deg=-1).advice.partition(",")[0]
-        'Let the slope descend in walking direction (slope_deg above 0)'
+        'Let the slope descend in the walking direction (slope_deg above 0)'
         """
         error = self.content.no_answer
         return "" if error is None else error.advice

@@ -224,7 +224,10 @@ def sweep(
 
 
 def warn(messages: Iterable[str], inside: int = 0) -> None:
-    """Issue warnings that point at the line that called the API, `inside` function calls further out."""
+    """Issue warnings that point at the line that called the API.
+
+    inside  number of functions of the API between the one that the user called and the one that calls this one
+    """
     for text in messages:
         warnings.warn(text, stacklevel=3 + inside)
 

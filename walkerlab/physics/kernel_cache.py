@@ -211,7 +211,7 @@ def cache_folder() -> Path:
     # There can be too many folders only after one was created.
     if not existed:
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
-    # `_remove_unused` reads the time of the last use from the folder's time of change.
+    # `_remove_unused` takes the folder's modification time as the time of its last use.
     os.utime(folder)
     return folder
 

@@ -100,7 +100,8 @@ class ByType:
         return register
 
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
-        # Numbers and arrays have no class here. NoneType has no case, so they get the default body.
+        # Numba's types of numbers and arrays have no `instance_class`. NoneType stands for them: no case is registered
+        # for it, so they get the default body.
         chosen = getattr(kind, "instance_class", type(None))
         return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
 
@@ -134,8 +135,8 @@ class LawKind(NamedTuple):
     key: str  # last part of the key
     laws: dict[str, Any]  # classes of the built-in laws, by name in a config
     protocol: type
-    required: tuple[ByType, ...]  # functions of which each law needs a case
-    together: tuple[ByType, ...] = ()  # functions of which a law needs either all cases or none
+    required: tuple[ByType, ...]  # functions that need a case for each law
+    together: tuple[ByType, ...] = ()  # a law needs a case of all these functions or of none
     derived: bool = False  # whether a law's class must derive from `protocol`, whose fields it then has
 
 

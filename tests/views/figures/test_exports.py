@@ -194,7 +194,7 @@ def test_rigid_walk_is_the_default_without_a_contact_walk(run):
     ("what", "kind", "error", "said"),
     [
         ("tabl", "tex", ConfigError, "this run has no item tabl. Did you mean table"),
-        ("table-1", "tex", ConfigError, "compares with the paper's walker"),
+        ("table-1", "tex", ConfigError, "that table is about the paper's walker"),
         ("figure-07", "csv", ConfigError, "cannot be written as csv"),
         ("figure-11", "pdf", StaleError, "cannot be drawn"),
     ],

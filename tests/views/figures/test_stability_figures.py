@@ -54,9 +54,9 @@ def test_cells_of_diverging_walks_have_no_error_colour():
 
 def test_captions_state_the_number_of_cells():
     said = STICTION.render(stability_maps()).caption
-    assert "walked 3, off-pad 3, budget-exhausted 3 cells" in said
+    assert "walked in 3 cells, off-pad in 3, budget-exhausted in 3" in said
     assert "3 cells have another outcome" in said
-    assert "fine 3, wrong silently 3, diverges 3 cells" in STEP.render(stability_maps()).caption
+    assert "fine in 3 cells, wrong silently in 3, diverges in 3" in STEP.render(stability_maps()).caption
 
 
 def test_missing_maps_are_omitted_with_the_reason():

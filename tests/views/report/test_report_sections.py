@@ -45,7 +45,7 @@ from walkerlab.views.report.tables import Table
 from walkerlab.views.report.tracks import Track, slip_since_touch
 from walkerlab.views.report.words import words
 
-SHARES = "0 are inputs, 1 is reproduced, 1 explained, 2 contradicted by its own other values and 0 not reproduced"
+SHARES = "0 are inputs, 1 is reproduced, 1 explained, 2 contradicted by other values of the paper and 0 not reproduced"
 NO_GAIT = "no gait at a slope of 0.2 rad: nothing repeats itself"
 WITHOUT_GAIT = (
     LeftOut("fixedpoint", NO_GAIT),

@@ -61,7 +61,7 @@ class FitProblem:
         """Lower bound (quantities,) on each quantity's noise: rounding of its values, or a fraction of its size."""
         sizes = typical_sizes(self.forecast)
         resolution = self.forecast.measured.resolution
-        # Rounding to a resolution is uniformly distributed, which has this standard deviation.
+        # Rounding errors are uniformly distributed over one resolution, so this is their standard deviation.
         rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
         return np.maximum(NOISE_FLOOR * sizes, rounding)
 
@@ -340,7 +340,7 @@ def least_squares_fit(
     # SciPy refuses a start on a bound, but the last round may have ended there.
     inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
     whiten = mixed_model.whitening(data, noise)
-    # Derivatives cost one walk per parameter, so the last ones serve as long as the unknowns have hardly moved.
+    # Derivatives cost one walk per parameter, so the last ones are reused while the unknowns have hardly moved.
     known = (inside, data.J)
     offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
 

@@ -20,14 +20,14 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-# Residuals below this fraction of a quantity's size are no outliers. A missed heel strike leaves a far larger one.
+# Residuals below this fraction of a quantity's size are never outliers. A missed heel strike leaves a far larger one.
 SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
-NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference for which the answer suggests to fit a key of leg 2
+NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference for which the answer suggests fitting a key of leg 2
 PHASE_BINS: Final = 20
 # fraction of the leg length; the floor of a laboratory has about 0.001
 UNUSUALLY_ROUGH: Final = 0.003
-UNUSUAL_KICK: Final = 0.05  # change of the rates at a heel strike that is unusual, as a fraction of the rates
+UNUSUAL_KICK: Final = 0.05  # largest ordinary change of the rates at a heel strike, as a fraction of the rates
 # Largest acceptable scatter of averaged residuals, as a normal deviate. Of the walks that the model explains, 0.8 %
 # exceed it.
 MAX_DEPENDENCE: Final = 2.4

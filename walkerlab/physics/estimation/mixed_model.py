@@ -103,7 +103,7 @@ class Reduced(NamedTuple):
 
     fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
     G: Floats  # (rows, heights + kicks)
-    covariance: Floats  # (2, rows, rows) covariances of the rows that heights, and kicks, of unit variance would cause
+    covariance: Floats  # (2, rows, rows) covariances of the rows due to heights, and due to kicks, of unit variance
     quantity: NDArray[np.int64]  # (rows,)
     counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)
@@ -262,8 +262,8 @@ def estimate_noise(
 ) -> tuple[Noise, tuple[Noise, ...]]:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Returns the noise, and the likeliest noise for each set of disturbances. Fewer disturbances are a simpler
-    explanation, so more of them count only if they raise the likelihood.
+    Returns the noise for the chosen set of disturbances, and the likeliest noise for each set. Fewer disturbances are a
+    simpler explanation, so a larger set is chosen only if it raises the likelihood.
 
     earlier  likeliest noises for nearly the same rows; searches start from them if they are likelier than other starts
     """

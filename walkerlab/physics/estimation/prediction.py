@@ -26,7 +26,8 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     GAIN: (1.0, 0.1),
     DELAY: (0.0, 0.05),
 }
-"""Properties of clock and sensors that can be estimated: the value if a property is not, and a typical change."""
+"""Properties of the clock and the sensors that can be estimated. For each: its value if it is not estimated, and a
+typical change."""
 # Directions of the start are dropped if changes along them have a smaller relative effect on the next step than this.
 MIN_EFFECT: Final = 1e-3
 LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as later than the last heel strike.
@@ -87,8 +88,9 @@ class Readings:
 
     @cached_property
     def half_steps(self) -> NDArray[np.int64]:
-        """Number (values,) of the half step and leg of each angle. It is empty if angles are not compared at sample
-        times.
+        """Group index (values,) of each angle: angles of one leg in one half step have the same index.
+
+        Empty if angles are not compared at sample times.
         """
         if self.in_phase or not self.measured.sampled:
             return np.zeros(0, np.int64)
@@ -96,7 +98,7 @@ class Readings:
         return np.unique(2 * half[:, None] + [0, 1], return_inverse=True)[1].ravel()
 
     def sensors(self, u: Floats) -> dict[str, float]:
-        """Return the properties of clock and sensors for the unknowns u, which end with the nuisances."""
+        """Return the properties of clock and sensors for the unknowns u, which end with the nuisance parameters."""
         estimated = dict(zip(self.nuisances, u[u.size - len(self.nuisances) :], strict=True))
         return {name: value + estimated.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
@@ -231,7 +233,8 @@ class Forecast(Readings):
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
     ) -> tuple[Floats, Floats] | None:
-        """Return derivatives with respect to start and disturbances (values, columns), and sensors (values, nuisances).
+        """Return the derivatives with respect to the start and the disturbances (values, columns), and those with
+        respect to the sensors (values, nuisances).
 
         lifts  (heights, n) changes of the heights (m) in each disturbance
         """
@@ -268,8 +271,9 @@ class Forecast(Readings):
 
 
 def differentiate_settling(walks: StepMap, z: Floats, p: Any, directions: Floats) -> Floats:
-    """Return the change of the start at rest on the ground per change of z (d,) along each column of `directions` (d,
-    starts).
+    """Return the derivative of the start after `rest_on_ground` with respect to the start before, z (d,).
+
+    directions  (d, starts) directions of z, one derivative for each column
     """
     moves = SETTLING_STEP * directions.T
     ends = [walks.rest_on_ground(z + move, p) - walks.rest_on_ground(z - move, p) for move in moves]

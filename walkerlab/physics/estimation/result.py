@@ -10,7 +10,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Fit = Literal["fits", "fits-but", "misfit", "not-converged"]
 USABLE: Final = ("fits", "fits-but")
-"""Verdicts by which a model explains the walk, in order from the best."""
+"""Verdicts that mean that the model explains the walk, best first."""
 
 
 @dataclass(frozen=True)

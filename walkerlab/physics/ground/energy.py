@@ -48,7 +48,7 @@ def total_energy(system: OnGround, y: Any) -> float:
     """Compute the mechanical energy (J): kinetic, elastic, and potential relative to a fixed origin."""
     total = kinetic_energy(system.form, y) + potential_energy(system.form, y)
     for foot in range(2):
-        # A foot that has no ground stores no energy, even below the surface, where a scuffing foot is.
+        # A foot without ground stores no energy, even below the surface, for example when it scuffs.
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
     springs, stops = hinge_energies(system, y)

@@ -19,7 +19,7 @@ def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]
     for k in range(n):
-        # The other program measures angles from the slope's normal, but the state from the vertical.
+        # The other program measures angles from the slope's normal, but our state measures them from the vertical.
         y[2 + k], y[4 + n + k] = -slope, 0.0
         for j in range(chain.shape[1]):
             y[2 + k] += chain[k, j] * q[2 + j]

@@ -110,7 +110,8 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
         # slip.
         return smooth_step(slip, -v_s, law.static, v_s, -law.static)
     mu, slope = smooth_step(v, v_s, law.static, law.friction_velocity, law.dynamic)
-    # In both directions the force and the derivative of |slip| have opposite signs, so the derivative is always -slope.
+    # The force and the derivative of |slip| both change sign with the slip, so the derivative of the force is -slope in
+    # both directions.
     return (-mu if slip > 0.0 else mu), -slope
 
 

@@ -50,7 +50,10 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope. Those before foothold 0, the start's, have its height."""
+    """Return the height (m) of a foothold above the slope.
+
+    Footholds before number 0, at which a walk starts, have the height of number 0.
+    """
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 

@@ -186,7 +186,10 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """Mark the phases (step, phase) at which both walks are smooth: after the impact, and not between knee strikes."""
+    """Mark the phases (step, phase) at which both walks are smooth.
+
+    These are all phases after the impact, except those between a knee strike of one walk and the same one of the other.
+    """
     # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):

@@ -63,7 +63,7 @@ def walk_in_form(
     until   NO_LIMIT, a number of steps, or AT_LIFT. After a number of steps, the walk also ends when the feet pass each
             other. With AT_LIFT, it continues until the foot that carried the last step has lifted
 
-    Returns the outcome's number, or CHANGES_FORM, and the last event.
+    Returns the outcome code, or CHANGES_FORM, and the last event.
     """
     # Begin with the step size that the walk's previous form would have used next.
     stepping.begin(method, system, method.clock[stepping.T], method.y, method.clock[stepping.H_NEXT])

@@ -1,4 +1,4 @@
-"""Records of a walk on compliant ground besides its steps: samples, energy balance, tangent.
+"""Records of a walk on compliant ground in addition to its steps: samples, energy balance, tangent.
 
 The tangent follows the variational equations along the solver's steps. On each step the derivative Phi of the state
 obeys dPhi/dt = J(t) Phi. This equation is solved by three-stage Radau collocation on the same step, with J at the
@@ -238,7 +238,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Record account and work of the springs at a step's end, for the work in completed steps."""
+    """Record the energy account and the springs' work at the end of a step, for the work in completed steps."""
     for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.tally.spring_work = observer.tally.start_spring - hinge_energies(system, y)[0]

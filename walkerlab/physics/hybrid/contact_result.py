@@ -291,7 +291,7 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, forms.feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
-    # The released foot is exactly at the surface, which is no touch.
+    # The released foot is exactly at the surface, which does not count as a touch.
     walk_state.at_zero[foot * events.PER_FOOT + events.HEIGHT] = 1
 
 
@@ -317,7 +317,7 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats,
     work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
     if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
         return work._replace(hip=work.hip + springs)
-    # If the knees have dampers, the hip has none, so all work in the account that the torque does not do is theirs.
+    # If the knees have dampers, the hip has none, so the knees do all the work in `hip` that the torque does not do.
     return work._replace(hip=work.hip_torque + springs, knees=work.hip - work.hip_torque)
 
 

@@ -22,7 +22,8 @@ from walkerlab.physics.solvers.system import State
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 FRICTION_SWITCHES = 5  # first of up to four switching points of the friction law
-MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), which is no event, and rate of HEIGHT (m/s)
+# position of the foot's material (m), which is not an event function, and rate of HEIGHT (m/s)
+MATERIAL, VERTICAL_VELOCITY = 9, 10
 PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
@@ -33,7 +34,8 @@ EVENT_FUNCTIONS = SLIDE + 5
 # The end of a pulse has no event function, because it is due at a fixed time.
 PULSE_END = EVENT_FUNCTIONS
 NO_EVENT = -1
-# Row of the legs' relative angular velocity, which is no event. PULSE_END has no row, so the two may share a number.
+# Row of the legs' relative angular velocity, which is not an event function. PULSE_END has no row, so the two may share
+# a number.
 LEGS_TURN = EVENT_FUNCTIONS
 EVENT_ROWS = EVENT_FUNCTIONS + 1
 FARTHEST_SLIDE = 0.25  # largest slide of a stance foot's material from where it touched, as a fraction of the pitch
@@ -83,7 +85,7 @@ class WalkState(NamedTuple):
     # not lifted yet
     slip: Any
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
-    # (steps,) s, time at which each step's stance foot lifted or, while it is down, the other foot's touch
+    # (steps,) s, time at which each step's stance foot lifted, or of the other foot's touch if it has not lifted yet
     lift_time: Any
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot

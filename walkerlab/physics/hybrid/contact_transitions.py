@@ -14,10 +14,12 @@ from walkerlab.physics.hybrid.contact_state import WalkState, farthest_slide, is
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 
-STEP_AHEAD = 0.25  # a touch that is less than this fraction of the pitch ahead of the other foot ends no step
+# A touch ends a step only if the foot is ahead of the other one by at least this fraction of the pitch.
+STEP_AHEAD = 0.25
 # m; a foot this close to the surface is on it, within the error of an event's time
 AT_SURFACE = 1e-11
-TRIP = 0.25  # a foot that touches its old pad more than this fraction of the pitch from where it stood has tripped
+# A foot has tripped if it touches its old pad further than this fraction of the pitch from where it stood.
+TRIP = 0.25
 
 
 @kernel_part
@@ -59,7 +61,7 @@ def apply_event(
     elif kind == events.LEFT_EDGE or kind == events.RIGHT_EDGE:
         # From now on the row stands for the same edge of the new cell, one pitch away.
         walk_state.at_zero[event] = 0
-        # One edge of the old cell is the opposite edge of the new one, so that event function is now zero.
+        # The edge just crossed is the opposite edge of the new cell, whose event function is therefore zero now.
         opposite = events.LEFT_EDGE if kind == events.RIGHT_EDGE else events.RIGHT_EDGE
         walk_state.at_zero[foot * events.PER_FOOT + opposite] = 1
         walk_state.cells[foot] += 1 if kind == events.RIGHT_EDGE else -1
@@ -130,7 +132,7 @@ def set_foothold(
 
 @kernel_part
 def find_ground(walk_state: WalkState, foot: int, above: bool) -> None:
-    """Update whether there is ground below a foot in the air, after the feet have changed places or roles."""
+    """Update `has_ground` of a foot in the air, after the feet have changed places or roles."""
     if above:
         terrain = walk_state.ground.terrain
         stands = foot == walk_state.progress.stance

@@ -1,4 +1,7 @@
-"""Codes for how a walk ended or, if negative, continues, and limits for poses. Kernels of both models use them."""
+"""Codes for how a walk ended (negative codes: how it continues), and limits on poses.
+
+Kernels of both models use them.
+"""
 
 from walkerlab.outcome import Outcome
 

@@ -144,7 +144,7 @@ def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
 
 
 class Fates(NamedTuple):
-    outcome: Any  # (n,) the outcome's number
+    outcome: Any  # (n,) outcome codes
     steps: Any  # (n,) number of steps taken
 
 
@@ -154,7 +154,7 @@ def new_fates(n: int) -> Fates:
 
 @dispatch_by_type
 def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Record a heel strike at time t (s), with state y after it, and return GOES_ON or the outcome's number."""
+    """Record a heel strike at time t (s), with state y after it, and return GOES_ON or the outcome code."""
 
 
 @kernel
@@ -218,8 +218,8 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a solver step in every lane, accept it where no event is possible, and return whether a lane needs attention.
 
-    A lane needs attention if the solver step may contain an event or ends at one, the time is over, or solver steps are
-    too many or too small.
+    A lane needs attention if the solver step may contain an event or ends at one, if time is up, or if there are too
+    many solver steps or they become too small.
     """
     rows = memory.rows
     y = load_state(rows, START_STATE)
@@ -274,7 +274,7 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Handle the solver step of a lane that needs attention.
 
-    Returns GOES_ON, or the outcome's number if the lane's walk is over.
+    Returns GOES_ON, or the outcome code if the lane's walk is over.
     """
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:

@@ -1,4 +1,4 @@
-"""Records of a rigid walk besides its heel strikes: samples, energies, and extremes that test model assumptions."""
+"""Records of a rigid walk apart from its heel strikes: samples, energies and extremes that test model assumptions."""
 
 from typing import Any, NamedTuple
 
@@ -50,7 +50,7 @@ RIGID_TALLY = record_type(RigidTally, {})
 
 @pass_by_reference
 class Observer(NamedTuple):
-    """Record of a walk besides its heel strikes. If not `watching`, it stays empty."""
+    """Record of a walk in addition to its heel strikes. It stays empty unless `watching`."""
 
     watching: bool
     times: Any  # (samples,) s, rising
@@ -103,7 +103,7 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
                 push = push_off(model, after)
                 along = along - push.along
                 impulse = impulse - push.upward
-                # The push-off acts on the trailing foot, which also needs friction for it.
+                # The push-off acts on the trailing foot, so that foot needs friction, too.
                 tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
             tally.strike_loss += tally.step_strike_loss
             tally.forward_work += tally.step_forward_work

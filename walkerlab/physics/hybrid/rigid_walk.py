@@ -312,7 +312,7 @@ def new_heel_strikes(
 def walk(
     walker: Any, method: Any, finder: CrossingFinder, observer: Observer, y: Any, strikes: HeelStrikes
 ) -> tuple[int, int]:
-    """Walk until `strikes` is full or the walk ends, and return the outcome's number and the number of steps taken.
+    """Walk until `strikes` is full or the walk ends, and return the outcome code and the number of steps taken.
 
     walker  models of the first step and, if the legs differ, of the second, from `models_in_turn`
     y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last state

@@ -52,7 +52,7 @@ class SpringDamper(NamedTuple):
 
     stiffness: float  # N m/rad
     damping: float  # N m s/rad; a law dissipates energy only if it is not 0
-    torque: float  # N m, turns the first body forward and the second back; all energy that a law supplies is its work
+    torque: float  # N m, turns the first body forward and the second back; a law supplies energy only by this torque
 
     @classmethod
     def units(cls, energy: float, time: float) -> "SpringDamper":
@@ -82,7 +82,7 @@ HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, No
 
 
 def law_named_by(fields: Iterable[str]) -> Any:
-    """Return the hinge law that a record type with these fields names."""
+    """Return the hinge law named by one of a record type's fields, or SpringDamper if none names a law."""
     return next(kernels.classes_named_by(fields), SpringDamper)
 
 

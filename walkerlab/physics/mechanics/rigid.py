@@ -49,7 +49,8 @@ def rigid_on_level_ground(
         raise ValueError(
             "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
         )
-    # Lengths and falls are scaled by the length of leg 1. In the second model leg 1 is the stance leg.
+    # Lengths, and the hip height below which a walker has fallen, are scaled by the length of leg 1. In the second
+    # model leg 1 is the stance leg.
     return rigid_model.pair(first.changed(leg_length=second.leg_length), second)
 
 

@@ -326,7 +326,7 @@ def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
 
 @kernel_part
 def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
-    """Compute the ground force (N) on the stance foot, along the slope (in walking direction) and normal to it."""
+    """Compute the ground force (N) on the stance foot, along the slope (in the walking direction) and normal to it."""
     model = system.model
     n = len(model.arm_x)
     s, c, F, U = vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x)

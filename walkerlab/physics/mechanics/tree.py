@@ -47,7 +47,8 @@ def fast_fields(kind: R) -> R:
 def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]], law: type[SpringDamper] = SpringDamper) -> Any:
     """Create the NumPy type of a structured scalar with the fields of a class and its bases, eight bytes per number.
 
-    law  hinge law of a Mechanism. The type names any law but SpringDamper by an additional field without a value
+    law  hinge law of a Mechanism. For any law but SpringDamper, the type has an additional, unused field whose name
+         identifies the law
     """
     marks = [] if law is SpringDamper else [(f"{law.__module__}/{law.__qualname__}", np.int64)]
     fields = [

@@ -29,7 +29,7 @@ UNREACHED = -1  # attractor index of a walk that reaches no attractor
 MAX_CYCLE_PERIOD = 32  # steps; longer cycles count as aperiodic
 CYCLE_DISTANCE = 1e-7  # states closer than this count as equal
 SETTLING_STEPS = 2_000  # steps before a walk is checked for a cycle
-FIRST_STARTS = 64  # starts that walk SETTLING_STEPS before any attractor is known
+FIRST_STARTS = 64  # number of starts whose walks take SETTLING_STEPS before any attractor is known
 RESETTLING_STEPS = 400  # further steps of settled walks, at tight tolerances
 RETURN_STEPS = 1_000  # steps within which a walk near an attractor must come ten times closer to it
 MAX_SETTLED_WALKS = 32  # maximum number of settled walks that are continued
@@ -163,7 +163,8 @@ def stride_of(walker: Walker) -> int:
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """Find the attractors that the unit walker reaches from section coordinates `starts` (n, 3)."""
-    # The first starts walk the full length. Later starts do so only if they reach no attractor known by then.
+    # Walks from the first starts have the full length. Walks from later starts have it only if they reach no attractor
+    # known by then.
 
     def add_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)

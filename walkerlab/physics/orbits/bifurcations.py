@@ -132,7 +132,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
-    # negative derivative with respect to s of the multiplier that crosses -1
+    # minus the derivative, with respect to s, of the multiplier that crosses -1
     rate = (passing[0] - passing[1]) / (2.0 * gap)
     form = None
     probe = NORMAL_FORM_STEP

@@ -28,7 +28,7 @@ CONTACT_EFFORT = Effort(1e-10, max_evaluations=10, shortest=1e-3, growth=2.0, ro
 # factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
 MAX_STIFFENING = 100.0
 MAX_CREEP_FACTOR = 30.0
-# strides from nearly rigid ground (0) to the actual ground (1)
+# increments of the parameter that runs from nearly rigid ground (0) to the actual ground (1)
 FIRST_STRIDE = 0.25
 RIGIDITY_STRIDES = Strides(1.0, 0.02, 2)
 

@@ -106,7 +106,7 @@ def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tu
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
-    """Return the distance (m) of foot 0 ahead of foot 1, and its derivatives (n,) with respect to the angles."""
+    """Return how far (m) foot 0 is ahead of foot 1, and the derivatives (n,) with respect to the angles."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
     x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
@@ -258,7 +258,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
-        # With room for a single touchdown, the walk stops there, and the push can be applied.
+        # With room for only one touchdown in the record, the walk stops at that touchdown, where the push acts.
         stopped = continue_walk(shorten(walk_state, 1), start)
         system = forms.place_on_ground(walker, walk_state.has_ground, walk_state.knee)
         stopped = replace(stopped, state=push_at_hip(system, walker, stopped.state, push))
@@ -402,7 +402,7 @@ class ContactMap(StepMap):
         """Prepare the map of a family of walkers.
 
         walker_at      function from the parameter to a walker, or to None if the value gives no valid walker
-        scale          magnitude of significant changes of the parameter
+        scale          size of a typical change of the parameter
         step_length_m  step length of a gait, which is the pitch of the plane that replaces pads
         like           walker of the family that gives the units
         first          leg that swings in even steps: 0 for leg 1, 1 for leg 2

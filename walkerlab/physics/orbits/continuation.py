@@ -20,14 +20,14 @@ from walkerlab.physics.orbits import newton
 from walkerlab.physics.orbits.newton import Data, Effort, Equations, Evaluated, NotConverged, Solution
 from walkerlab.physics.solvers.system import Floats
 
-FEW_CORRECTIONS = 3  # the next step is longer if no more Newton corrections than this were needed
+FEW_CORRECTIONS = 3  # the next step is longer if at most this many Newton corrections were needed
 ROOT_RESOLUTION = 1e-14  # accuracy of a root, in arclength
 # (abscissa, solution) pairs, latest last
 Points = tuple[tuple[float, Floats], ...]
 
 
 class Strides(NamedTuple):
-    """Limits of the stride in the parameter, and the number of points that the predictor uses."""
+    """Limits of the increments of the parameter, and the number of points that the predictor uses."""
 
     widest: float
     narrowest: float
@@ -35,7 +35,7 @@ class Strides(NamedTuple):
 
 
 class FollowerState(NamedTuple):
-    """Value up to which a solution has been followed, the next stride, and the last points."""
+    """Parameter value up to which a solution has been followed, its next increment, and the last points."""
 
     value: float
     stride: float
@@ -64,7 +64,7 @@ class Follower:
 
     def follow_to(self, target: float) -> FollowerState:
         """Follow the solution to the parameter value `target`, or until it is lost."""
-        # Only the last stride depends on the target, so the cached strides serve every target.
+        # Only the last increment depends on the target, so the cached states are valid for every target.
         state = self._states[0]
         for state in self._states:  # the list grows during the loop
             following = state.value + state.stride

@@ -16,8 +16,10 @@ from walkerlab.physics.solvers.system import Floats
 PRECISION = 1e-9  # a search ends when the quantity changes by less than this, relative to its initial value
 MAX_DESIGN_ITERATIONS = 60
 BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer than this to a bound count as on it
-SAME_OPTIMUM = 1e-4  # searches that end closer than this fraction of the range found the same optimum
-PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values of the quantity per squared range
+SAME_OPTIMUM = 1e-4  # searches whose results differ by at most this fraction of the range found the same optimum
+# Penalty for a point without a gait, at a distance of one range from the last gait, as a multiple of the quantity's
+# initial value. It grows with the square of the distance.
+PENALTY_SLOPE = 10.0
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ class GaitBranch:
             if gait.stable:
                 values.append(gait.value)
             if gait.stable != following.stable:
-                # If no bifurcation was located between the two points, assume the change halfway.
+                # If no bifurcation was located between the two points, assume that stability changes halfway.
                 on_it = (b.value for b in self.bifurcations if b.lies_between(gait, following))
                 edge = next(on_it, 0.5 * (gait.value + following.value))
                 if stable:
@@ -204,8 +204,8 @@ class BranchTracer:
         return GaitBranch(period, tuple(points), (first, end), tuple(located), tuple(crossings))
 
     def check_after(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
-        """Return a test of the next point: whether multipliers near the unit circle move little, and the gait is not a
-        shorter one.
+        """Return a test of the next point: multipliers near the unit circle must change little, and the gait must not
+        repeat after fewer steps, except at a flip.
         """
         # A pair of crossings is missed if multipliers move far. A gait of fewer steps solves the equations too, and a
         # long step may reach it. Its branch meets this one only at a flip, where a multiplier of the cycle is 1.

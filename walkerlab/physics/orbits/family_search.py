@@ -158,7 +158,7 @@ class FamilySearch:
         swept = attractors.sweep_attractor(self.step_map, start, values, how.transient, how.samples, advance)
         if not swept.found:
             return replace(family, attractors=swept)
-        # Attractors are listed by rising value.
+        # Attractors are listed in order of increasing parameter value.
         if end < begin:
             swept = replace(swept, found=swept.found[::-1])
         chosen = swept.found[:: max(1, len(swept.found) // how.exponents)]

@@ -37,9 +37,9 @@ SOLVED_RESIDUAL = 1e-14
 MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # settings for following a gait from a vanishing slope
-SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # strides in the logarithm of the slope's cube root
+SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # increments of the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
-# Relative residual. It cannot be small, because a multiplier tends to 1 as the slope vanishes.
+# relative residual; a tighter tolerance cannot be met, because a multiplier tends to 1 as the slope vanishes
 FOLLOWING_TOLERANCE = 1e-6
 # largest relative distance from the prediction. Beyond it, the gait belongs to another branch
 MAX_STATE_JUMP = 0.05
@@ -249,7 +249,7 @@ class SlopeBranch:
         z is None if the gait is lost.
         """
         s = float(np.cbrt(slope))
-        # Below the seed's slope, a guess between the limit and the seed is good enough to start there.
+        # Below the seed's slope, interpolation between the limit and the seed is accurate enough to start near `slope`.
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
             return 0.0, None

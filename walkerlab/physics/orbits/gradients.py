@@ -36,7 +36,7 @@ STEP_QUANTITY_COUNT = 3  # number of quantities, listed first, that follow from 
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
-STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
+STEP_FACTOR = 1.5  # step of a difference quotient, as a multiple of the fifth root of the relative tolerance
 APPROACH_STEPS = (1e-4, 1e-2)  # multiples of that step, to find the direction of the family
 STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # multiples of that step, tried in turn for the derivatives
 SMALL_ERROR = 1e-3  # relative error at which no smaller step is needed
@@ -111,7 +111,7 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
     """Differentiate the quantities of a gait with respect to the parameter.
 
-    scale  magnitude of significant changes of the parameter
+    scale  size of a typical change of the parameter
 
     Returns an empty dictionary if the step map fails at nearby values.
     """
@@ -165,7 +165,7 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
         return stride.steps[-1].z if stride.outcome is Outcome.WALKED else None
 
     moved = derivative(step_from, h)
-    # `moved` is A guess + dP/dp.
+    # `moved` is gait.A @ guess + dP/dp.
     return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
 
 

@@ -49,7 +49,7 @@ class Effort(NamedTuple):
 
     tolerance: float  # largest residual of a solution
     max_evaluations: int = MAX_NEWTON_EVALUATIONS
-    shortest: float = 1.0  # fraction of a move at which it is no longer halved
+    shortest: float = 1.0  # a move of at most this fraction of a full one is not halved again
     growth: float = 1.0  # a move is halved if it multiplies the residual by this or more
     rounding: float = ROUNDING_FACTOR  # see ROUNDING_FACTOR
 

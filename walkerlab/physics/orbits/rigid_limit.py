@@ -34,8 +34,8 @@ WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
 SERIES_EFFORT = CONTACT_EFFORT._replace(max_evaluations=30)
-# Duration of a push-off divided by sqrt(d / g), where d is the static penetration. So short a push-off ends while the
-# other foot is still landing.
+# Duration of a push-off divided by sqrt(d / g), where d is the static penetration. Such a short push-off ends while
+# the other foot is still landing.
 PUSH_OFF_FACTOR = 0.1
 
 
@@ -110,7 +110,7 @@ class Distance:
 
 @dataclass(frozen=True)
 class Limit:
-    """Ground of a series, and what its settings are compared with: the rigid gait and the walk from the rigid start."""
+    """Ground of a series of contact settings, and the rigid gait and walk that they are compared with."""
 
     ground: JudgedGround
     period_s: float

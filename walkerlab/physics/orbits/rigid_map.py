@@ -44,9 +44,10 @@ MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # number of solver methods to keep, one for each number of tangent columns
 LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples are taken here, so that none falls after the heel strike
-# in sqrt(L/g). Standing still is also a fixed point, and any shorter step counts as that.
+# in sqrt(L/g). Standing still is also a fixed point, so any shorter step counts as standing still.
 SHORTEST_STEP = 0.05
-# Newton's method from random starts: number of evaluations, and fraction of a move at which it is no longer halved
+# Newton's method from random starts gives up after this many evaluations, and if a move is less than this fraction of a
+# full one.
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6
 NO_RESIDUAL = 1e300
 NEAR_RESIDUAL = 1e-6
@@ -414,7 +415,10 @@ class SimilarWalker(NamedTuple):
         return self.swings[swing % len(self.swings)]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
-        """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""
+        """Return the rise to each foothold and the nearest landing (see HeelStrikes), in units of the walker.
+
+        heights_m  (steps + 1,) heights of the footholds, beginning with the present one
+        """
         rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
         return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
 
@@ -443,7 +447,7 @@ class RigidMap(StepMap):
         """Prepare the map of a family of walkers.
 
         walker_at  function from the parameter to a walker, or to None if the value gives no valid walker
-        scale      magnitude of significant changes of the parameter
+        scale      size of a typical change of the parameter
         like       any walker of the family
         """
 
@@ -559,7 +563,7 @@ class RigidMap(StepMap):
             moved = np.column_stack((columns, lifts[step + 1]))
             before, after = moved @ tangents.before, moved @ tangents.after
             lengths = rigid.step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
-            # The times of samples are fixed, so a step that begins later is sampled earlier.
+            # The sample times are fixed, so if a step begins later, its samples lie earlier within it.
             samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
             parts.append((moved @ tangents.waits, lengths, after[:, rigid.STANCE], tangents.rates, samples))
             columns = after

@@ -40,7 +40,8 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
 }
 """For each largest survived disturbance, its kind and its sign."""
 INDICATORS = ("step_period", "step_length", "speed")
-DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks: a stride, if the legs differ
+# The responses of this many steps (a stride, if the legs differ) are difference quotients of exact walks.
+DIRECT_STEPS = 2
 # offsets and weights of fourth-order formulas for a first derivative, the most accurate first
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
@@ -58,7 +59,7 @@ class GaitOnMap(NamedTuple):
     p: float  # value of the parameter
     z: Floats  # (d,) section coordinates at the start
     A: Floats  # (d, d) derivative of a stride
-    units: Units  # length, mass and time of the walker, in which states are scaled
+    units: Units  # length, mass and time of the walker, by which states are scaled
     swing: int = 0  # number of steps of the gait before z, as in `Stepper.step`
 
     @property
@@ -170,7 +171,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 def largest_survived(stands: Callable[[float], bool], unit: float, width: float = BISECTION_WIDTH) -> float:
     """Return the size up to which every disturbance is survived, at most MAX_DISTURBANCE times `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
-    # Sizes are tried from the smallest on, so that all sizes below the result are survived.
+    # Sizes are tried in increasing order, so that the gait survives every size below the result.
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
         return MAX_DISTURBANCE * unit

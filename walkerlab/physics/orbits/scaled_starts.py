@@ -55,7 +55,8 @@ class ScaledStarts:
     by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
     by_stance: State  # (2 + n) velocities due to the stance leg's angular velocity
     steps: int
-    # periods (s) and lengths (m) of the steps of a gait to settle on, one for equal legs; None if not required
+    # (period in s, length in m) of each step of the gait on which walks must settle, one pair if the legs are equal;
+    # None if they need not settle
     gait: tuple[tuple[float, float], ...] | None
     tolerances: Tolerances = START_TOLERANCES
 

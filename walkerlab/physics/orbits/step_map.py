@@ -101,11 +101,11 @@ class StepMap(Stepper, Protocol):
 
     # all coordinates of the section are of magnitude one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures
-    scale: float  # magnitude of significant changes of the parameter
+    scale: float  # size of a typical change of the parameter
     tolerances: Tolerances  # solver settings of a step
     probe: float  # size of a disturbance with a linear response, in units of the walker
     stride: int = 1  # number of steps after which the map repeats: 2 for legs that differ
-    disturbs_after: int = 0  # heel strikes between a section and the first step that heights and pushes disturb
+    disturbs_after: int = 0  # number of heel strikes from a section to the first step disturbed by heights or pushes
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
@@ -336,11 +336,14 @@ def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
-    """Return the eigenvalues by falling magnitude. In a complex pair, the positive imaginary part comes first."""
+    """Return the eigenvalues in order of decreasing magnitude.
+
+    In a complex pair, the one with the positive imaginary part comes first.
+    """
     return sort_multipliers(np.linalg.eigvals(DP).astype(np.complex128))
 
 
 def sort_multipliers(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Sort multipliers as `multipliers_of` returns them."""
+    """Sort multipliers into the order in which `multipliers_of` returns them."""
     order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
     return np.asarray(values[list(order)])

@@ -159,7 +159,8 @@ def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> i
 def divide_out_zero(stack: Any, size: int) -> int:
     """Divide a zero at the start out of the polynomial at the bottom of the stack, and return its new size."""
     degree = size - 1
-    # For i > 0, b_i B_i of degree n is x times b_i (n / i) B_(i-1) of degree n - 1, and b_0 is the zero.
+    # For i > 0, b_i B_i of degree n is x times b_i (n / i) B_(i-1) of degree n - 1. b_0 is 0, because it is the value
+    # at the start.
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i
     return degree
@@ -234,7 +235,7 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
 
 @kernel_part
 def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
-    """Evaluate a piece at x (0 to 1) by nested products."""
+    """Evaluate a piece, stored in Bernstein form, at x (0 to 1) by nested multiplication."""
     degree = size - 1
     u = 1.0 - x
     power = 1.0

@@ -356,8 +356,8 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
         shrink = max(shrink, max(1.0 / RADAU_GROWTH, min(1.0 / RADAU_SHRINK, predicted)))
     control[ERROR_OLD], control[H_OLD] = max(1e-2, error), h
     h_new = h / shrink
-    # With the same Jacobian and step size the factored matrices serve again, which is worth more than a slightly longer
-    # step.
+    # With the same Jacobian and step size the factored matrices can be reused, which is worth more than a slightly
+    # longer step.
     if control[FRESH] == 0.0 and KEEP_LOW * h <= h_new <= KEEP_HIGH * h:
         return h
     return h_new

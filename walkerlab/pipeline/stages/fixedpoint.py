@@ -82,7 +82,7 @@ def advice(config: RigidConfig) -> str:
     if any(push_offs(config.push_off)) or config.walker.hip.torque_N_m:
         tried = f"The drive may be too strong or too weak on this slope: try another {drives}"
     elif config.slope_rad <= 0.0:
-        tried = f"Let the slope descend in walking direction (slope_deg above 0), or drive the walker ({drives})"
+        tried = f"Let the slope descend in the walking direction (slope_deg above 0), or drive the walker ({drives})"
     else:
         tried = "Find gaits on other slopes with `walkerlab continuation`"
     return f"{tried}; {walk_anyway}."

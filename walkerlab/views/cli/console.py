@@ -156,7 +156,7 @@ class StageLine:
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Begin a piece of work of `total` parts, or None if their number is unknown."""
+        """Begin a piece of work. `total` is the number of its parts, or None if that is unknown."""
         self.label = label
         self.total = total
         self.done = 0

@@ -104,7 +104,7 @@ FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
 def run_to_export(run: str, request: Request) -> runs.RunFolder:
-    """Find a run, and warn if its config file was edited since.
+    """Find a run, and warn if its config file has been edited since the run.
 
     Raises ConfigError if there is no such run.
     """
@@ -256,8 +256,8 @@ def table(folder: runs.RunFolder, name: str, kind: str, console: Console) -> Tab
         summary = the_result(results, folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
-            f"{folder.path} has no {name}: it compares with the paper's walker, and this run has another walker.",
-            f"Its page has {join_words(page_tables(folder))}.",
+            f"{folder.path} has no {name}: that table is about the paper's walker, and this run has a different one.",
+            f"The page of the run has {join_words(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
     if kind == "tex":

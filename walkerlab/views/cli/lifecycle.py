@@ -32,7 +32,7 @@ def init(
     walker: Annotated[
         str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
     ] = "compass",
-    checks: Annotated[bool, typer.Option("--check", help="Add a printed gait to fill in for `check`.")] = False,
+    checks: Annotated[bool, typer.Option("--check", help="Add a `check` block for a printed gait.")] = False,
 ) -> None:
     """Write a commented config to start from, and a schema for checks in editors."""
     from walkerlab.views.cli.init import write_config
@@ -85,10 +85,10 @@ def export(
         typer.Option(metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."),
     ] = None,
     output: Output = None,
-    columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns of a figure or a LaTeX table.")] = 1,
+    columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure or LaTeX table fills.")] = 1,
     width: Annotated[
         float | None,
-        typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
+        typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; a column is 252 wide."),
     ] = None,
     dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = EXPORT_DPI,
     model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Model of the trajectory; {FIRST_WALK}.")] = None,
@@ -165,11 +165,11 @@ def animate(
     output: Output = None,
     model: Annotated[
         str | None,
-        typer.Option(metavar="STAGE|both", help=f"Model of the walk, or both for both in one picture; {FIRST_WALK}."),
+        typer.Option(metavar="STAGE|both", help=f"Model of the walk, or `both` to draw both together; {FIRST_WALK}."),
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
+        typer.Option(min=1, help="Steps to show, from the first. Default: 4 or, for a fall, the last 4 and the fall."),
     ] = None,
     rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
     slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,

@@ -208,7 +208,10 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def fail(error: WalkerlabError) -> typer.Exit:
-        """Print a failure and, with `--json`, an object that describes it, and return the exit that it causes."""
+        """Print a failure and, with `--json`, an object that describes it.
+
+        Returns the exception that ends the command with the failure's exit code.
+        """
         if request.as_json:
             # The failure may be that the run could not be resolved.
             run_dir = str(request.folder.path) if "resolved_run" in vars(request) else None
@@ -219,7 +222,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
 
     try:
         yield
-        # Otherwise an error of the output would appear at exit, with a traceback.
+        # Without this line, an error in writing the output would appear only at exit, with a traceback.
         sys.stdout.flush()
     except WalkerlabError as error:
         raise fail(error) from None
@@ -381,7 +384,10 @@ class Offer(NamedTuple):
 
 
 def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
-    """Add a command to the program of a graph. Errors of its function end it as `exit_on_failure` describes."""
+    """Add a command to the program of a graph.
+
+    If the command's function raises an error, the command ends as `exit_on_failure` describes.
+    """
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # A flag such as --from cannot be the name of a parameter.

@@ -40,7 +40,7 @@ class SweepRequest(Request):
         metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
     )
     at_once: int = option(
-        "--jobs", default=0, metavar="N", min=0, help="Chunks computed simultaneously; 0: all cores, on Slurm 16."
+        "--jobs", default=0, metavar="N", min=0, help="Chunks computed simultaneously; 0: one per core, or 16 on Slurm."
     )
     chunk_seconds: float | None = option(
         metavar="S", help="Target duration of a chunk; default: depends on the engine."
@@ -69,7 +69,7 @@ def sweep(request: SweepRequest) -> None:
     chosen, address = parse_engine(request.engine)
     loaded = request.loaded
     over = request.over or ()
-    block = loaded.config.sweep or Sweep()  # its values stand for options that are not given
+    block = loaded.config.sweep or Sweep()  # options that are not given take their values from it
     own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
     question = build_sweep(
         request.stage or block.stage,

@@ -224,7 +224,7 @@ class Desk:
                     answer = self.worker.do(call)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    # The signal to drop a request kills a worker that has no handler yet. This is no fault of the call.
+                    # The signal to drop a request kills a worker that has no handler yet. That is not the call's fault.
                     deaths += error.exit_code_of_worker != -GIVE_WAY
                     if deaths > 1:
                         return failure(500, error.message, error.advice)

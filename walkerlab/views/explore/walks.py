@@ -29,7 +29,7 @@ INITIAL_KEYS: Final = (
 )  # fmt: skip
 """Keys that the page shows before the user searches, in this order. An entry that ends in a dot stands for a block."""
 DRIVE_BLOCKS: Final = ("walker.hip.", "push_off.")
-"""Blocks of which the page shows only non-zero keys before the user searches."""
+"""Blocks whose keys are hidden while they are zero, until the user searches for them."""
 HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
@@ -165,11 +165,11 @@ GIVE_WAY = signal.SIGUSR1
 
 
 class SupersededError(BaseException):
-    """Raised if a newer request waits. It is a BaseException, so that no handler mistakes it for a failure."""
+    """Raised if a newer request is waiting. It is a BaseException, so that no handler mistakes it for a failure."""
 
 
 class GivingWay(Silent):
-    """Progress reporter that abandons a request when a newer one waits, but only between two gaits.
+    """Progress reporter that abandons a request when a newer one is waiting, but only between two gaits.
 
     Acting on the signal at once could interrupt an import.
     """
@@ -183,7 +183,7 @@ class GivingWay(Silent):
         self._superseded = True
 
     def advance(self, n: int = 1) -> None:  # noqa: ARG002
-        """Raise SupersededError if a newer request waits."""
+        """Raise SupersededError if a newer request is waiting."""
         if self._superseded:
             raise SupersededError
 
@@ -287,7 +287,7 @@ def follow_gaits(question: ExploredConfig) -> Answered:
         return question.refusal(error)
     except SupersededError:
         return SUPERSEDED
-    # Attractors also have step periods, but they are no branches.
+    # Attractors also have step periods, but they are not branches.
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if is_walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}

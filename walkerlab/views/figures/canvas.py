@@ -30,7 +30,8 @@ HEIGHT_EXPONENT = 0.7
 """Power of a figure's width to which its height is proportional. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Maximum ratio of an axis's limits, and the multiples of powers of ten that are then labelled as well."""
+"""Ratios of an axis's limits, each with multiples of powers of ten that are labelled, too, if the limits have a smaller
+ratio."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_PLAIN_NUMBER: Final = 1e4
 """Largest number that labels show without an exponent."""
@@ -58,8 +59,10 @@ class ShownFigure(Figure):
 
 
 def blank(height: float) -> Figure:
-    """Create a figure of the style's width. `height` (in) applies to the default width. It shrinks less than the width
-    does."""
+    """Create a figure of the style's width.
+
+    `height` (in) is the height at the default width. In a narrower figure, the height shrinks less than the width.
+    """
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** HEIGHT_EXPONENT), layout="constrained")
     # The layout depends on the sizes of texts, which the canvas measures.
@@ -147,7 +150,7 @@ def break_lines(figure: Figure) -> None:
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
     """Return the figure as a file of one kind. `name` keeps the ids in an SVG different from those of other figures."""
-    # Files of equal figures are equal to the byte, so they must not contain a date or a version.
+    # Equal figures must give byte-identical files, so the files must not contain a date or a version.
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
         "png": {"metadata": {"Software": None, "Title": title}},

@@ -99,8 +99,10 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Read a quantity along a branch and at its bifurcations. It is stable between two points if the gaits at both
-    are."""
+    """Read a quantity along a branch and at its bifurcations.
+
+    The branch counts as stable between two points if the gaits at both points are stable.
+    """
     value = group["value"]
     quantity = group[name]
     stable = group["stable"].astype(bool)
@@ -113,14 +115,15 @@ def curve_of(group: Group, name: str) -> Curve:
     # A bifurcation counts as stable, so that stable stretches reach up to it.
     known = np.insert(stable, places, True)
     on_mark = np.insert(np.zeros(stable.size, bool), places, True)
-    # No gait between two neighbouring bifurcations shows whether gaits are stable there, so they count as unstable.
+    # If no gait was computed between two neighbouring bifurcations, the stability there is unknown, so that stretch
+    # counts as unstable.
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
     marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
     return Curve(value, quantity, between, tuple(marks))
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step along a branch, and its bifurcations, and return the kinds of these.
+    """Plot a quantity of every step along a branch, mark the branch's bifurcations, and return their kinds.
 
     Lines are solid where gaits are stable, otherwise dashed.
     """
@@ -165,8 +168,8 @@ ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "st
 MARGIN: Final = 0.06
 """Margin around the stable gaits, relative to their span. Beyond it, unstable branches are cut off."""
 MIN_PANEL_SPAN: Final = 0.05
-"""Minimum fraction of the full range that panel (b) spans, and of all values that a vertical axis spans.
-"""
+"""Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its largest
+magnitude."""
 MIN_LABEL_DISTANCE: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
 MAX_DETAIL_FRACTION: Final = 0.8

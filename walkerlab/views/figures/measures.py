@@ -23,7 +23,8 @@ FIGURE_HEIGHT = 4.6
 LABEL_SIZE = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Length (leg lengths) up to which a dimension gets no arrow, only a label, and a sole no mark at its centre."""
+"""A dimension up to this length (leg lengths) gets a label but no arrow, and a sole up to this radius gets no mark at
+its centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
@@ -244,7 +245,7 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
 
 
 def letters(texts: Sequence[str]) -> int:
-    """Return the number of characters in the longest line of `texts`, and some more as a margin."""
+    """Return the number of characters in the longest line of `texts`, plus a margin of two."""
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 

@@ -21,7 +21,7 @@ ROBUSTNESS_STAGE: Final = "robustness"
 PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("sensitivity norm (s/m)", "gaits.{}.gait_sensitivity_norm", lambda norm: norm),
     ("1 − largest multiplier", "gaits.{}.spectral_radius", lambda radius: 1.0 - radius),
-    # The largest step down is drawn below zero, and that up (`UP`) above it.
+    # The largest step down is drawn below zero, and the largest step up (`UP`) above it.
     ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
     ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
 )
@@ -87,7 +87,7 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
 
 
 def rows_of(group: Group, name: str, model: str) -> list[Values]:
-    """Return the values (points,) of a model for each of its rows in a table, which are two if the legs differ."""
+    """Return a model's values (points,) for each of its rows in a table. It has two rows if the legs differ."""
     rows = []
     for row in range(MAX_ROWS):
         if name.format(row) in group.variables:
@@ -107,7 +107,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def plot_drives(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
-    """Plot, over speed, the cost of each drive and the disturbances that gaits with this drive survive."""
+    """Plot cost of transport, sensitivity and largest step down against speed, for each drive."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}

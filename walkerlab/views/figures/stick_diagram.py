@@ -40,7 +40,7 @@ SIDEROOM = 0.12
 """Free space on either side of the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""Angles (rad) from the leg's line of points of a sole: all points that are drawn (`ARC`), and the middle one."""
+"""Angles (rad) of points on a sole, measured from the leg's line: all points drawn (`ARC`), and the middle one."""
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
@@ -222,8 +222,9 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: walks.Array) -> None:
-    """Label the landings with their times. Draw an arrow above `path` (samples, 2) in walking direction, with the
-    slope."""
+    """Label the landings with their times. Above `path` (samples, 2), draw an arrow in the walking direction, labelled
+    with the slope.
+    """
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -312,7 +313,7 @@ FILM_NEEDS = {
     stage: illustration.Need(stage, walks.TRAJECTORY, (*walks.STATE_VARIABLES, *walks.JOINTS), walks.NO_STATES)
     for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
-"""Variables that an animation needs. They include none of steps, because a walk can end in its first step."""
+"""Variables that an animation needs. None are of the group `steps`, because a walk can end in its first step."""
 FIGURES = tuple(
     illustration.paper_figure(number, (FILM_NEEDS[stage], walks.STEPS_TAKEN[stage]), partial(draw_cycle, stage))
     for number, stage in ((2, RIGID_STAGE), (6, CONTACT_STAGE))
@@ -336,7 +337,7 @@ RELIEF_DEPTH = 0.075
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> walks.Array:
     """Return the times (s) of an animation's frames. The last frame of a fall lasts a second, so that it can be seen.
 
-    steps   number of steps shown, from the first; None: four or, for a fall, the last four and the fall
+    steps   number of steps shown, from the first; None for four or, if the walker falls, the last four and the fall
     rate    frames per second
     slower  slow-motion factor
     """

@@ -26,7 +26,7 @@ POINT: Final = 1.0 / 72.0
 PNG_DPI: Final = 160
 """Resolution of PNGs on the page (pixels per inch)."""
 EXPORT_DPI: Final = 300
-"""Default resolution of exports (pixels per inch), as journals require it."""
+"""Default resolution of exports (pixels per inch), as required by journals."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),

@@ -149,7 +149,7 @@ def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """Draw the bound of stability, mark the parameter values `missing`, which have no answer, and set the scales."""
+    """Draw the stability bound, mark the parameter values without an answer (`missing`), and set the scales."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:

@@ -57,7 +57,7 @@ def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk to plot over time. `time` has its samples (samples,) in s."""
+    """A walk to plot over time. `time` has the times (samples,) of its samples in s."""
 
     look: Look  # style of its model
     outcome: str  # how the walk ended
@@ -160,8 +160,10 @@ FROM_RIGID = Need(TUNE_STAGE, "rigid_start", ("time", "velocity"), "the rigid mo
 
 
 def redoes_the_procedure(results: Results) -> bool:
-    """Whether the walker is the paper's compass, so that the figure repeats one of the paper and names legs as it
-    does."""
+    """Whether the walker is the paper's compass.
+
+    If so, the figure reproduces one of the paper's and uses the paper's names for the legs.
+    """
     return "paper_start" in results[TUNE_STAGE].summary
 
 
@@ -191,7 +193,7 @@ STATES_IN_TIME = (
 
 
 def draw_states(results: Results) -> Drawn:
-    """Plot angle and angular velocity of each leg, in a row each, shaded while the leg is in stance."""
+    """Plot angle and angular velocity of each leg, each in its own panel, shaded while the leg is in stance."""
     walks, extent = first_strides(walks_with(results, STATE_VARIABLES))
     first = walks[0]
     figure, axes = plot_over_time(walks, 1.55, STATES_IN_TIME)
@@ -277,11 +279,11 @@ SMALLEST_SPAN = 0.005
 constant."""
 RANGE_MARGIN = 0.08
 TRIMMED_SHARE = 0.005
-"""Fraction of the samples, at each end of the range, that does not set the scale, because they lie in impacts."""
+"""The axis ignores this fraction of the samples at each end of the range, because they lie in impacts."""
 
 
 def draw_energies(results: Results) -> Drawn:
-    """Plot kinetic, potential and mechanical energy over time, in a row each."""
+    """Plot kinetic, potential and mechanical energy over time, each in its own panel."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = plot_over_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (TRIMMED_SHARE, 1.0 - TRIMMED_SHARE)) for walk in walks])
@@ -315,7 +317,7 @@ SHOWN_STRIDES = 2
 SHOWN_STEPS = 40
 """Number of steps in the figure of energy losses."""
 SHOWN_LOADS: Final = 0.99
-"""Fraction of the samples with load that fit on the axis of the force. Impacts of many times the weight do not fit."""
+"""The force axis covers this fraction of the loaded samples. It leaves out impacts of many times the weight."""
 NEGLIGIBLE_LOSS: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 

@@ -29,7 +29,7 @@ FIRST_VALUES = 4
 LAST_VALUES = 6
 """Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
-"""Maximum number of steps of a cycle whose periods a sentence lists."""
+"""A sentence lists the step periods of cycles of at most this many steps."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
@@ -140,7 +140,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """Format quantities of steps, by the number of the step. '…' stands for the middle of a long walk."""
+    """Format the quantities of each step, by step number. The key '…' stands for the middle steps of a long walk."""
     from walkerlab.views.report.sections.walks import format_step
 
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}

@@ -230,7 +230,8 @@ class Results:
     stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
     pictures: tuple[Picture, ...] = ()  # embedded figures of `plot`
     absent: tuple[LeftOut, ...] = ()  # missing results, with reasons
-    pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
+    # results that were not computed yet when the page was written or the command was stopped
+    pending: tuple[LeftOut, ...] = ()
     failed: frozenset[str] = frozenset()  # stages that were run and failed
 
     @property

@@ -57,8 +57,8 @@ NONE = "–"
 SPACE = "\u00a0"
 """No-break space between a number and its unit."""
 MIN_LENGTH_M = 1e-9
-"""Length below which a length counts as zero. Walkers are centimetres to metres tall, and walks accurate to 1e-10 of
-it."""
+"""Length below which a length counts as zero. Walkers are centimetres to metres tall, and walks are accurate to
+1e-10 of the height."""
 PLAIN_FROM = 1e-4
 PLAIN_BELOW = 1e6
 """Range of magnitudes that are written without a power of ten."""

@@ -190,8 +190,9 @@ class Page:
     lead: tuple[str, ...] = ()  # paragraphs under the title
     file: str = MAIN
     study: Source | None = None  # the study that the run reproduces, or None
-    relation: str = "Redoes"  # first word of the line about the study, or After if the scene is not the study's
-    pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
+    relation: str = "Redoes"  # first word of the line about the study; 'After' if the scene differs from the study's
+    # results that were not computed yet when the page was written or the command was stopped
+    pending: tuple[LeftOut, ...] = ()
     run: str = ""  # name of the run for suggested commands; empty for the default run
 
 

@@ -30,8 +30,10 @@ class Cell:
 
     @property
     def datum(self) -> Any:
-        """Content of the cell in a file: the value that the text shows or, without one, the text, or None if that is
-        empty."""
+        """Content of the cell in a file: the value that the text shows if there is one, otherwise the text.
+
+        None if the text is empty.
+        """
         if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
             return self.value
         plain = self.value if isinstance(self.value, str) else self.text

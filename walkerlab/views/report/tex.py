@@ -19,7 +19,7 @@ WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
 SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
 """Start of a box that is at most as wide as the text around it."""
 MIN_HEAD: Final = 10
-"""Number of characters of a column's head that always fit on one line."""
+"""Number of characters of a column heading that always fit on one line."""
 MAX_UNWRAPPED: Final = 28
 """Number of characters of a cell above which the column is wrapped."""
 WRAPPED: Final = r">{\raggedright\arraybackslash}p{11em}"
@@ -117,12 +117,12 @@ def is_number(value: Any) -> bool:
 
 
 def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
-    """Choose the format of a column's numbers: integers, equal decimals, or equal significant digits."""
+    """Choose the format of a column's numbers: integers, or equally many decimals or significant digits."""
     if all(isinstance(value, int) for value in numbers):
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
     decimals = max(0, COLUMN_DIGITS - 1 - math.floor(math.log10(max(sizes))))
-    # Equal decimals are used only if they cost the smallest number at most one digit.
+    # Use the same number of decimals only if the smallest number loses at most one digit by it.
     if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
     return lambda value: "0" if value == 0.0 else format_digits(value)

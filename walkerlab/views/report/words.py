@@ -51,7 +51,7 @@ ERROR_TEXTS = {
 
 
 MAX_LAST_ERROR_RATIO = 0.01
-"""Fraction of the largest error below which the answer also gives the error of the last step."""
+"""The answer also gives the error of the last step if it is less than this fraction of the largest error."""
 
 
 def describe_error(error: Mapping[str, Any]) -> str:

@@ -51,7 +51,7 @@ def costs(summary: Row) -> Table:
 
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
     """Yield a row for each method of a scene, with the fastest run for each level of error, and the smallest error."""
-    # Of an error below the uncertainty of the reference, nothing is known but that it is below.
+    # If an error is below the uncertainty of the reference, all we know is that it is below.
     best = summary["best"].get(scene, {}).values()
     bound = float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():

@@ -94,9 +94,9 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield a row for each reason, with the results that it affects, then a row with the results that need those.
+    """For each reason, yield a row with the results that it affects and, if other results need these, a row with those.
 
-    A row has the results, the reason, and what their omission saves.
+    A row has the results, the reason, and what leaving them out saves.
     """
     reasons = {absent.why for absent in missing}
     # The actual reason comes last, such as 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'.

@@ -13,7 +13,8 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 NO_EFFECT = 1e-6
-"""Fraction of the largest singular value below which a combination of parameters counts as without effect on walks."""
+"""Fraction of the largest singular value below which a combination of parameters counts as having no effect on
+walks."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 NOTABLE_CHANGE = 0.5  # smallest reported change of an estimate (standard errors) for a 1 % larger fixed parameter
 TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
