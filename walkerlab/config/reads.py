@@ -269,8 +269,7 @@ def slice_of(config: schema.Config, takes: type | None) -> dict[str, Any]:
     def part(data: Any, takes: type | None) -> Any:
         return data if takes is None else {name: part(data[name], inner) for name, inner in keys_of(takes).items()}
 
-    selected: dict[str, Any] = part(config.model_dump(mode="json"), takes)
-    return selected
+    return dict(part(config.model_dump(mode="json"), takes))
 
 
 def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:

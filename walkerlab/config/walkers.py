@@ -514,10 +514,8 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
         # The parts of the stance leg are locked to each other, so all of them have the angle of the leg.
         place |= dict.fromkeys(stance, 1)
         for coupling in walker.couplings:
-            coupled[place[coupling.body]] = (
-                coupling.body,
-                {place[of]: w for of, w in zip(coupling.of, coupling.weights, strict=True)},
-            )
+            weights = {place[of]: weight for of, weight in zip(coupling.of, coupling.weights, strict=True)}
+            coupled[place[coupling.body]] = coupling.body, weights
     if walker.torso is not None:
         coupled[rigid_bodies(walker) - 1] = "torso", {0: 0.5, 1: 0.5}
     return coupled

@@ -92,11 +92,9 @@ def _meaning(field: FieldInfo) -> str:
     return ": ".join(part for part in (field.description, fields.describe_allowed(field)) if part)
 
 
-def _comment(text: str, indent: str) -> Iterator[str]:
-    return iter(
-        textwrap.wrap(
-            text, LINE_WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}#   ", break_on_hyphens=False
-        )
+def _comment(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(
+        text, LINE_WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}#   ", break_on_hyphens=False
     )
 
 

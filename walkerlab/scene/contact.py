@@ -10,7 +10,7 @@ import numpy as np
 from walkerlab.config import reads, walkers
 from walkerlab.config.contact import Contact
 from walkerlab.errors import NoAnswer
-from walkerlab.physics.ground import friction, normal_force, resting, terrain
+from walkerlab.physics.ground import friction, normal_force, terrain
 from walkerlab.physics.ground.compliant import ContactDrives, KneeRules, contact_walker
 from walkerlab.physics.ground.walker import floating_state
 from walkerlab.physics.hybrid import contact_state, recorded_walk
@@ -207,19 +207,15 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     return (*y[: 2 + n], y[2 + n] - rolled, *y[3 + n :])
 
 
-def stance_equilibrium(scene: ContactScene) -> resting.RestingFoot:
+def scene_measures(scene: ContactScene) -> dict[str, Any]:
     walker = scene.walker
     # The static penetration is that under the whole weight, not under the component normal to the slope.
-    return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
-
-
-def scene_measures(scene: ContactScene) -> dict[str, Any]:
-    foot = stance_equilibrium(scene)
+    foot = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
     return {
         "static_penetration_m": foot.depth,
         "damping_ratio": foot.damping_ratio,
         "pitch_m": scene.pitch_m,
-        "friction": scene.walker.friction.describe(),
+        "friction": walker.friction.describe(),
     }
 
 

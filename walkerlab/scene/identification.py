@@ -189,10 +189,10 @@ def identify_walk(
         for model, result in zip(question.models, results, strict=True)
     )
     if not answers:
-        raise NoAnswer(
-            f"no walk of the model can be fitted: {verdicts[0].reasons[0]}.",
-            "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters.",
+        advice = (
+            "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters."
         )
+        raise NoAnswer(f"no walk of the model can be fitted: {verdicts[0].reasons[0]}.", advice)
     return replace(max(answers, key=rank), models=verdicts)
 
 
@@ -305,20 +305,14 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     keys = question.keys
     information = information_on(best, keys)
     combinations, left_open = open_combinations(information)
-    errors = np.sqrt(np.diag(information.covariance)).tolist()
-    estimates = tuple(
-        Estimate(
-            key,
-            value,
-            None if key in left_open else error,
-            parameter_of(key, subject.config).unit,
-            start,
-            any(abs(value - bound) <= AT_BOUND * scale for bound in bounds),
-        )
-        for key, value, error, start, bounds, scale in zip(
-            keys, forecast.parameters(best.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
-        )
-    )
+    values = forecast.parameters(best.u)
+    deviations = zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True)
+    errors = [None if key in left_open else deviation for key, deviation in deviations]
+    units = [parameter_of(key, subject.config).unit for key in keys]
+    limits = zip(values, problem.bounds, forecast.scales, strict=True)
+    at_bound = [any(abs(value - bound) <= AT_BOUND * scale for bound in bounds) for value, bounds, scale in limits]
+    rows = zip(keys, values, errors, units, problem.start, at_bound, strict=True)
+    estimates = tuple(Estimate(*row) for row in rows)
     pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(best, keys, question.prior))
     second_leg = mass_of_second_leg(subject.config) if forecast.walks.stride == 1 and alternates(steps) else None
     fixed = [*fixed_parameters(subject, question, best, fixed_keys(subject, question))]
@@ -383,9 +377,8 @@ def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
     """Yield, for each estimate at a bound, how far the data would move it, in standard errors of the free estimate."""
     scales = fitted.forecast.scales
     errors = independent_errors(fitted)
-    for key, u, move, error, bounds, scale in zip(
-        keys, fitted.u, fitted.evaluation.move, errors, fitted.problem.bounds, scales, strict=False
-    ):
+    rows = zip(keys, fitted.u, fitted.evaluation.move, errors, fitted.problem.bounds, scales, strict=False)
+    for key, u, move, error, bounds, scale in rows:
         for bound in bounds:
             if abs(u * scale - bound) <= AT_BOUND * scale:
                 yield Pull(key, "bound", bound, float(abs(move) / error))
@@ -482,12 +475,8 @@ def changes_alone(
     Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters
     keep the config's values. If there are fewer than two of them, nothing is yielded.
     """
-    if (
-        len(keys) < 2
-        or subject.model != RIGID
-        or fitted.problem.priors
-        or distance_from_config(keys, fitted) < FAR_FROM_CONFIG
-    ):
+    unsuited = len(keys) < 2 or subject.model != RIGID or fitted.problem.priors
+    if unsuited or distance_from_config(keys, fitted) < FAR_FROM_CONFIG:
         return
     # A likelihood-ratio test must not prefer the estimates, which change more parameters, to this single change.
     enough = fitted.evaluation.likelihood - 0.5 * chdtri(len(keys) - 1, REJECTED)
@@ -603,9 +592,8 @@ def fixed_parameters(
     indices = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
     scales = [*wide.scales[count:].tolist(), *(NUISANCES[name][1] for name in sensors)]
     units = [*(parameter_of(key, subject.config).unit for key in fixed), *map(unit_by_name, sensors)]
-    for name, value, scale, unit, index in zip(
-        (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
-    ):
+    rows = zip((*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True)
+    for name, value, scale, unit, index in rows:
         # If the walk at the larger value ends early, the exact difference can still use the other side.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
@@ -671,11 +659,10 @@ def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
     steps = forecast.measured.count
     variance = fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + ((fitted.data.G * fitted.data.spread(fitted.noise)) ** 2).sum(axis=1))
+    starts = range(0, steps * len(forecast.channels), steps)
     return tuple(
         StepTable(name, values, fitted.predicted.values[first : first + steps], total[first : first + steps])
-        for first, (name, values) in zip(
-            range(0, steps * len(forecast.channels), steps), forecast.channels.items(), strict=True
-        )
+        for first, (name, values) in zip(starts, forecast.channels.items(), strict=True)
     )
 
 

@@ -50,11 +50,8 @@ class Parameter:
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
             why = f": {subject} {reason.replace('Input should', 'should')}"
-        return ConfigError(
-            f"{dotted(key)}: {self.key} cannot be {value:g} {self.unit}{why}",
-            f"`walkerlab schema {self.key}` lists the allowed values.",
-            key,
-        )
+        advice = f"`walkerlab schema {self.key}` lists the allowed values."
+        return ConfigError(f"{dotted(key)}: {self.key} cannot be {value:g} {self.unit}{why}", advice, key)
 
     def vary(self, config: reads.ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""

@@ -89,11 +89,9 @@ def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
     """Build the error for a config key `where` that names a parameter `key` which none of the models uses."""
-    return ConfigError(
-        f"{where}: {key} does not affect the {' or the '.join(models)} model",
-        "Choose a key that the model uses, or another model (--model).",
-        tuple(where.split(".")),
-    )
+    text = f"{where}: {key} does not affect the {' or the '.join(models)} model"
+    advice = "Choose a key that the model uses, or another model (--model)."
+    return ConfigError(text, advice, tuple(where.split(".")))
 
 
 # Solver settings, with a budget per step, for walks whose steps are only counted.

@@ -18,14 +18,13 @@ from walkerlab.api import open_run
 from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
-from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.artifact import read, write
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.provenance import begin
-from walkerlab.pipeline.store.runs import Record, RunFolder
+from walkerlab.pipeline.store.runs import RunFolder, claim
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Film, Target, export_from, gif, walk_in, write_film
 from walkerlab.views.figures import illustration
@@ -41,13 +40,14 @@ QUIET = Console(quiet=True)
 
 @pytest.fixture(scope="module")
 def original(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("paper")
+    folder = tmp_path_factory.mktemp("runs") / "paper"
+    folder.mkdir()
     for name, result in both_models().items():
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
     # Without it, all results would be read to find the config.
-    RunFolder.open_folder(folder).write_record(Record("paper", "", to_yaml(load().config)))
+    claim(RunFolder.open_folder(folder), load().config)
     return folder
 
 

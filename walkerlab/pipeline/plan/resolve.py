@@ -130,10 +130,8 @@ def artifact_at(path: Path) -> tuple[RunFolder, files.ConfigFile] | None:
     try:
         stored = artifact.read(path)
     except Damaged as error:
-        raise ConfigError(
-            f"{path} is damaged, and no config can be taken from it: {error}.",
-            f"Use the config of its folder: `-c {folder.quoted_path}`.",
-        ) from None
+        advice = f"Use the config of its folder: `-c {folder.quoted_path}`."
+        raise ConfigError(f"{path} is damaged, and no config can be taken from it: {error}.", advice) from None
     return folder, files.ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
 
 

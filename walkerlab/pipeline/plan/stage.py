@@ -165,15 +165,11 @@ class Stage:
     def refuse_unsuited(self, target: str, config: "Config") -> None:
         """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
         if "recording" in self.requires and config.recording is None:
-            raise ConfigError(
-                f"{target} needs a recorded walk, and {message_without_block('recording')}.",
-                "Name its file: walkerlab compare --with FILE.",
-            )
+            advice = "Name its file: walkerlab compare --with FILE."
+            raise ConfigError(f"{target} needs a recorded walk, and {message_without_block('recording')}.", advice)
         if self.why_no_such_legs(config) is not None:
-            raise ConfigError(
-                f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
-            )
+            advice = f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}."
+            raise ConfigError(f"{target} needs two equal legs, but those of this walker differ.", advice)
         # Imported here to keep the help of the command line fast.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 

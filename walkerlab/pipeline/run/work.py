@@ -154,10 +154,8 @@ class Spread:
             raise error
         self._deaths += 1
         if self._deaths > MAX_DEATHS and not self._alive:
-            raise NoAnswer(
-                f"all worker processes died: {type(error).__name__}: {error}",
-                "Results are kept: run the same command again to resume. Check this machine's memory and limits.",
-            )
+            advice = "Results are kept: run the same command again to resume. Check this machine's memory and limits."
+            raise NoAnswer(f"all worker processes died: {type(error).__name__}: {error}", advice)
         middle = len(batch) // 2
         if failures and middle:
             self._again.extend((half, 1) for half in (batch[:middle], batch[middle:]))

@@ -122,14 +122,10 @@ def pads_group(terrain: Terrain, end: float) -> Group:
     pitch = terrain.pitch
     numbers = np.arange(-2, int(np.ceil(end / pitch)) + 3)
     centres = numbers * pitch + np.where(numbers % 2, terrain.lanes[0] + pitch, 0.0)
-    return Group(
-        {
-            **numbered(numbers.size, "pad", "pad number"),
-            "left_m": Variable(centres - 0.5 * pitch, ("pad",), "m", "start of the pad along the slope"),
-            "right_m": Variable(centres + 0.5 * pitch, ("pad",), "m", "end of the pad along the slope"),
-            "leg": Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
-        }
-    )
+    left = Variable(centres - 0.5 * pitch, ("pad",), "m", "start of the pad along the slope")
+    right = Variable(centres + 0.5 * pitch, ("pad",), "m", "end of the pad along the slope")
+    leg = Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in")
+    return Group({**numbered(numbers.size, "pad", "pad number"), "left_m": left, "right_m": right, "leg": leg})
 
 
 def trajectory_group(

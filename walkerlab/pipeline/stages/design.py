@@ -130,10 +130,8 @@ def refuse(config: DesignConfig) -> None:
     """Raise ConfigError for an invalid `design` block."""
     design = config.design or analyses.Design()
     if (design.minimise or design.maximise) is None or not design.over:
-        raise ConfigError(
-            "design needs a quantity to optimise and a parameter to vary.",
-            "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15.",
-        )
+        advice = "For example --minimise gait_sensitivity_norm --over walker.hip_mass_kg=5:15."
+        raise ConfigError("design needs a quantity to optimise and a parameter to vary.", advice)
     if design.model == "contact" and config.contact is None:
         raise walkers.contact_required_error("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]

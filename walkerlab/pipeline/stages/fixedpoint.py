@@ -53,10 +53,8 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
         for equations in track(progress, "fixedpoint", len(sets), sets)
     }
     chosen = searches[config.equations]
-    content = Content(
-        {f"{name}/gaits": gaits_group(search, config) for name, search in searches.items() if search.gaits},
-        summary(config, searches),
-    )
+    groups = {f"{name}/gaits": gaits_group(search, config) for name, search in searches.items() if search.gaits}
+    content = Content(groups, summary(config, searches))
     if chosen.gait is None:
         nothing = "no gait was found" if chosen.random_starts and not chosen.gaits else "no gait"
         message = f"{nothing} at a slope of {config.slope_rad:.4g} rad: {chosen.reason}"
@@ -144,10 +142,9 @@ def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     text = "multiplier of a stride" if differ else "multiplier"
     found_by = np.array(["; ".join(gait.found_by) for gait in gaits])
     objections = np.array(["; ".join(gait.objections) for gait in gaits])
+    labels = {"state": STATE, **labels_of_gait(gaits[0])}
     variables = {
-        **rows_group(
-            gaits, {"state": STATE, **labels_of_gait(gaits[0])}, GAIT, "gait, shortest period first"
-        ).variables,
+        **rows_group(gaits, labels, GAIT, "gait, shortest period first").variables,
         **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), text),
         "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
         "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starts that found this gait"),

@@ -81,10 +81,8 @@ def read_data(config: IdentifyConfig) -> MeasuredFile:
     """
     block = config.identify or Identify()
     if not block.data or not block.fit:
-        raise ConfigError(
-            "identify needs a measured walk and a parameter to estimate.",
-            "For example --data steps.csv --fit walker.hip_mass_kg --fit slope_deg.",
-        )
+        advice = "For example --data steps.csv --fit walker.hip_mass_kg --fit slope_deg."
+        raise ConfigError("identify needs a measured walk and a parameter to estimate.", advice)
     refuse_model(config, block)
     if block.sensors and block.level == "steps":
         raise ConfigError(
@@ -241,13 +239,10 @@ def sample_group(result: Identification) -> Group:
     """Build the group of angle residuals (swing leg, stance leg) over the phase of a step."""
     measured = result.measured
     swing_first = reorder_by_leg(angle_residuals(result), 1 - measured.step % 2)
-    return Group(
-        {
-            "phase": Variable(measured.phase, ("sample",), "1", "elapsed fraction of the step's period"),
-            "of_step": Variable(measured.step, ("sample",), "1", "index of the step"),
-            "residual_rad": Variable(swing_first, ("sample", "leg"), "rad", "measured minus predicted angle"),
-        }
-    )
+    phase = Variable(measured.phase, ("sample",), "1", "elapsed fraction of the step's period")
+    step = Variable(measured.step, ("sample",), "1", "index of the step")
+    residual = Variable(swing_first, ("sample", "leg"), "rad", "measured minus predicted angle")
+    return Group({"phase": phase, "of_step": step, "residual_rad": residual})
 
 
 def identified_config(config: IdentifyConfig, result: Identification) -> IdentifyConfig:

@@ -176,20 +176,15 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     refuse_units(table, block.units, STEP_KINDS)
     for key in ("fps", "from_s", "to_s", "min_likelihood", "walks"):
         if getattr(block, key) is not None:
-            raise ConfigError(
-                f"identify.{key}: a table of steps has no samples.",
-                f"Leave out {key}, or give angles (--level angles).",
-                ("identify", key),
-            )
+            advice = f"Leave out {key}, or give angles (--level angles)."
+            raise ConfigError(f"identify.{key}: a table of steps has no samples.", advice, ("identify", key))
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")
     columns = {name: column for name in STEP_KINDS if (column := read_column(table, name, block)) is not None}
     if "period_s" not in columns:
         near = get_close_matches("period_s", table.columns, 1, 0.3) or list(table.columns)[:1]
-        raise ConfigError(
-            f"{path} has no column period_s; it has: {', '.join(list(table.columns)[:8])}.",
-            f'Name the column of periods: --columns "period_s={near[0]}". Angles over time need --level angles.',
-        )
+        advice = f'Name the column of periods: --columns "period_s={near[0]}". Angles over time need --level angles.'
+        raise ConfigError(f"{path} has no column period_s; it has: {', '.join(list(table.columns)[:8])}.", advice)
     values = {name: in_si for name, (in_si, _) in columns.items()}
     period = values["period_s"]
     if period.size < MIN_STEPS:

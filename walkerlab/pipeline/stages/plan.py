@@ -63,15 +63,11 @@ def refuse(config: reads.PlanConfig) -> None:
     refuse_keys(config, block)
     for key in plan.errors:
         if key not in block.keys:
-            raise ConfigError(
-                f"plan.errors: {key} is not estimated.", f"Name one of {', '.join(block.keys)}, or add --fit {key}.",
-                ("plan", "errors"),
-            )  # fmt: skip
+            advice = f"Name one of {', '.join(block.keys)}, or add --fit {key}."
+            raise ConfigError(f"plan.errors: {key} is not estimated.", advice, ("plan", "errors"))
     if plan.steps > plan.max_steps:
-        raise ConfigError(
-            f"plan.steps: {plan.steps} exceeds plan.max_steps, {plan.max_steps}.", "Raise plan.max_steps.",
-            ("plan", "steps"),
-        )  # fmt: skip
+        text = f"plan.steps: {plan.steps} exceeds plan.max_steps, {plan.max_steps}."
+        raise ConfigError(text, "Raise plan.max_steps.", ("plan", "steps"))
 
 
 def row_of(option: "WayToMeasure", units: Mapping[str, str], wanted: Mapping[str, float]) -> dict[str, Any]:
@@ -92,18 +88,10 @@ def curves_of(options: "Sequence[WayToMeasure]", keys: Sequence[str]) -> Group:
     """Build the group of errors by number of steps, with missing values for undetermined parameters."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
-    return Group(
-        {
-            "steps": Variable(np.array(counts), ("steps",), "1", "number of measured steps"),
-            "standard_error": Variable(
-                np.array(errors, float),
-                ERROR_DIMENSIONS,
-                "SI",
-                "standard error in the key's unit; missing if the walk does not determine it",
-                missing=True,
-            ),
-        }
-    )
+    steps = Variable(np.array(counts), ("steps",), "1", "number of measured steps")
+    meaning = "standard error in the key's unit; missing if the walk does not determine it"
+    standard_error = Variable(np.array(errors, float), ERROR_DIMENSIONS, "SI", meaning, missing=True)
+    return Group({"steps": steps, "standard_error": standard_error})
 
 
 STEP_MEASUREMENTS: Final = {

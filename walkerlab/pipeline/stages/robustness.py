@@ -157,9 +157,8 @@ def run(
     content = Content(groups, {**answer, "steps": config.robustness.steps})
     if unstable:
         reason = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
-        raise NoAnswer(
-            reason, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
-        )
+        advice = "Choose a slope with a stable gait: `walkerlab continuation` shows where they are."
+        raise NoAnswer(reason, advice, content)
     return content
 
 
@@ -266,14 +265,13 @@ def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
     roughness = np.array(config.robustness.roughness_m)
     caps = np.array([cap(model, config) for model in steps])
     about = "steps that a walk took, at most cut_off_at"
-    return Group(
-        {
-            "model": Variable(np.array([*steps]), ("model",), "", "model that walks"),
-            "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
-            "cut_off_at": Variable(caps, ("model",), "1", "step limit of a walk"),
-            "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
-        }
-    )
+    variables = {
+        "model": Variable(np.array([*steps]), ("model",), "", "model that walks"),
+        "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
+        "cut_off_at": Variable(caps, ("model",), "1", "step limit of a walk"),
+        "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
+    }
+    return Group(variables)
 
 
 def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[str, Group]:

@@ -169,14 +169,13 @@ def write_in_turn(
             if name not in content.coordinates:
                 yield name, variable
 
+    def root() -> dict[str, Attribute]:
+        return {**root_attributes(labelled, identity, provenance, digest.hex()), **content.attrs}
+
     with replacing(path) as temporary:
         # Free space is checked first, because the HDF5 library cannot close a file that it cannot write.
         refuse_full_disk(temporary, content.size)
-        hdf5.write_in_turn(
-            temporary,
-            remaining(),
-            lambda: {**root_attributes(labelled, identity, provenance, digest.hex()), **content.attrs},
-        )
+        hdf5.write_in_turn(temporary, remaining(), root)
         seal = file_digest(temporary)
         with temporary.open("ab") as file:
             file.write(f"\nwalkerlab sha256 {seal}\n".encode())
@@ -272,13 +271,10 @@ def index_files(folder: Path, files: Iterable[Path]) -> Group:
     listed = sorted(files)
     names = [path.relative_to(folder).as_posix() for path in listed]
     digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in listed]
-    return Group(
-        {
-            "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
-            # Figures that plot run times differ between runs, so the content's digest excludes the digests of files.
-            "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True),
-        }
-    )
+    paths = Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder")
+    # Figures that plot run times differ between runs, so the content's digest excludes the digests of files.
+    sha256 = Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True)
+    return Group({"file": paths, "sha256": sha256})
 
 
 def indexed_files(content: Content) -> dict[str, str]:

@@ -112,13 +112,6 @@ class RunFolder:
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return None
 
-    def write_record(self, record: Record) -> None:
-        """Write the run record.
-
-        Raises StorageError if that fails.
-        """
-        write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
-
     def worker(self) -> Holder | None:
         """Return the process that works in the folder, or None if the folder is idle or the command is unknown."""
         try:
@@ -245,22 +238,20 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
         return run
     names = sorted(path.name for path in runs_dir.glob("*/"))
     near = problems.suggestion(Path(text).name, names) or (f" Available runs: {', '.join(names)}." if names else "")
-    raise ConfigError(
-        f"there is no run {problems.printable(text, SHOWN_PATH)}.{near}",
-        "`walkerlab report` creates the run of the paper config.",
-    )
+    advice = "`walkerlab report` creates the run of the paper config."
+    raise ConfigError(f"there is no run {problems.printable(text, SHOWN_PATH)}.{near}", advice)
 
 
 def claim(folder: RunFolder, config: schema.Config) -> None:
     """Record in a folder which config its results belong to. Call this under the lock, before any result is written.
 
-    Raises ConfigError as `refuse_another_config` does.
+    Raises ConfigError as `refuse_another_config` does, and StorageError if the record cannot be written.
     """
     refuse_another_config(folder, config)
     record = folder.record()
     new_record = Record(folder.name, folder.source, writer.to_yaml(config), folder.changes)
     if record is None or (is_of_same_config_file(record, folder) and record != new_record):
-        folder.write_record(new_record)
+        write_atomically(folder.path / RECORD, json.dumps(asdict(new_record), indent=1).encode())
 
 
 def refuse_another_config(folder: RunFolder, config: schema.Config) -> None:
