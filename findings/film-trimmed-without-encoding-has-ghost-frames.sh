@@ -4,7 +4,7 @@
 # What one would guess: a film trimmed from 90 to 75 frames has 75 frames in every reader. If the file still holds the frames that
 # were cut off (a copy must begin at a key frame, so they stay and a list of edits hides them), a reader gives 75 or 90.
 # What happens: all readers hide the same 15 frames at the beginning, but the *number* of frames is that of the file:
-#   imageio.v3.imread, pyav   an array of 90 pictures, of which the last 15 were never written (np.empty): black, or old memory
+#   imageio.v3.imread, pyav   an array of 90 pictures; the last 15 were never written, so they may be black or noise
 #   imageio.v3.improps, pyav  90, PyAV's stream.frames too; imageio.v3.imiter and PyAV give 75
 #   OpenCV                    CAP_PROP_FRAME_COUNT is 90; 75 are read. Frame 80 is sought without an error, and is not there
 # A duration of 90 / 30 s is 20 % too long, and frame k of the tracked film is frame k + 15 of the uncut one.

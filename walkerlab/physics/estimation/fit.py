@@ -148,7 +148,9 @@ def fit(
     """
     forecast = problem.forecast
     u = start.copy()
-    disturbances = heights = even = np.zeros(forecast.heights)
+    even = np.zeros(forecast.heights)
+    heights = even
+    disturbances = even
     noise = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0)
     end = FitEnd.STILL_CHANGES
     data = linearise(problem, u, heights)

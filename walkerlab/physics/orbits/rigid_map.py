@@ -186,7 +186,8 @@ class RigidStepper(local):
         varied = tolerances.new(size * (1 + d))
         self.with_columns = lru_cache(KEPT_METHODS)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
-        y, pivots = np.zeros(size * (1 + d)), np.zeros(d, np.int64)
+        y = np.zeros(size * (1 + d))
+        pivots = np.zeros(d, np.int64)
         self.memory = Memory(varied, finder, new_idle_observer(), y, new_heel_strikes(1, 0, columns=d), pivots)
 
     def walk(
@@ -535,7 +536,9 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return None
-        units, (d, m), steps = unit.units, unit.section.basis.shape, heights_m.size - 1
+        units = unit.units
+        d, m = unit.section.basis.shape
+        steps = heights_m.size - 1
         rises, nearest = unit.floor(z, heights_m)
         walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
         if walk.outcome is not Outcome.WALKED:
