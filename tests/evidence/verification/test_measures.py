@@ -9,8 +9,7 @@ import pytest
 
 from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.appendix_a import impact
-from walkerlab.evidence.paper.walker import compass
+from walkerlab.evidence.paper.appendix_a import compass, impact
 from walkerlab.evidence.verification.catalogue import config_of, package_cases, scale_config, to_twin
 from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.starts import (

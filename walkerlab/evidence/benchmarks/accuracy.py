@@ -22,7 +22,7 @@ from walkerlab.evidence.benchmarks.trials import (
     stiff_ground_trial,
 )
 from walkerlab.evidence.benchmarks.words import words
-from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.evidence.paper.appendix_a import compass_or_none
 from walkerlab.labels import Label, labels_of
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import scale_rates

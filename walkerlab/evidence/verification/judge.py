@@ -22,8 +22,7 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.trials import walk_as_a_script
-from walkerlab.evidence.paper.appendix_a import RigidWalker
-from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.evidence.paper.appendix_a import RigidWalker, compass_or_none
 from walkerlab.evidence.verification.catalogue import config_of, pendulum_time, scale_config, to_twin
 from walkerlab.evidence.verification.starts import (
     ContactStart,
