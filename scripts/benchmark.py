@@ -40,7 +40,7 @@ from walkerlab.evidence.benchmarks.trials import (
     contact_trial,
     walk_as_a_script,
 )
-from walkerlab.evidence.paper.walker import compass, compass_or_none
+from walkerlab.evidence.paper.appendix_a import compass, compass_or_none
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.config import loader
-from walkerlab.evidence.paper.appendix_a import RigidWalker, accelerations, swing_constants
-from walkerlab.evidence.paper.walker import compass
+from walkerlab.evidence.paper.appendix_a import RigidWalker, accelerations, compass, swing_constants
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
 from walkerlab.physics.ground.walker import ContactWalker, place_on_ground
 from walkerlab.physics.kernels import kernel, kernel_part

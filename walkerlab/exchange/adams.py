@@ -25,6 +25,9 @@ def statements(model: AdamsModel) -> Iterator[str]:
     def expression(text: str) -> str:
         return REFERENCE.sub(lambda match: str(ids[match[1]]), text)
 
+    def numbered(kind: str, name: str, *arguments: str) -> Iterator[str]:
+        return named_statement(name, f"{kind}/{ids[name]}", *arguments)
+
     yield from statement("UNITS/", "FORCE = NEWTON", "MASS = KILOGRAM", "LENGTH = MILLIMETER", "TIME = SECOND")
     for number, name in enumerate((GROUND, *model.parts), start=1):
         yield from named_statement(name, f"PART/{number}", *part_arguments(model, name, ids))
@@ -34,47 +37,40 @@ def statements(model: AdamsModel) -> Iterator[str]:
                 short_name = marker_name.rpartition(".")[2]
                 yield from named_statement(short_name, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
-        head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
-        yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
+        kind = "JPRIM" if joint.kind == "INLINE" else "JOINT"
+        yield from numbered(kind, name, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
     for name, weights in model.couplers.items():
         coupled = ", ".join(str(ids[joint]) for joint in weights)
         kinds_of_joint = ":".join("R" for _ in weights)
         scales = f"SCALES = {values(*weights.values())}"
-        yield from named_statement(
-            name, f"COUPLER/{ids[name]}", f"JOINTS = {coupled}", f"TYPE = {kinds_of_joint}", scales
-        )
+        yield from numbered("COUPLER", name, f"JOINTS = {coupled}", f"TYPE = {kinds_of_joint}", scales)
     for name, shape in model.shapes.items():
         box = shape.kind == "BOX"
         where = f"{'CORNER' if box else 'CM'} = {ids[shape.marker]}"
         edges = zip("XYZ", shape.size, strict=True)
         sizes = (f"{axis}{'' if box else 'SCALE'} = {finite(edge)}" for axis, edge in edges)
-        yield from named_statement(name, f"GRAPHICS/{ids[name]}", shape.kind, where, *sizes)
+        yield from numbered("GRAPHICS", name, shape.kind, where, *sizes)
     for name, ends in model.outlines.items():
-        yield from named_statement(
-            name, f"GRAPHICS/{ids[name]}", f"OUTLINE = {', '.join(str(ids[end]) for end in ends)}"
-        )
+        yield from numbered("GRAPHICS", name, f"OUTLINE = {', '.join(str(ids[end]) for end in ends)}")
     for name, contact in model.contacts.items():
-        yield from named_statement(name, f"CONTACT/{ids[name]}", *contact_arguments(contact, ids))
+        yield from numbered("CONTACT", name, *contact_arguments(contact, ids))
     for name, function in model.variables.items():
-        yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
+        yield from numbered("VARIABLE", name, f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
         # If a statement has several functions, all but the last must end in a backslash.
-        yield from named_statement(
-            name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
+        yield from numbered(
+            "GFORCE", name, f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
             "FZ = 0\\", "TX = 0\\", "TY = 0\\", f"TZ = {expression(force.torque)}",
         )  # fmt: skip
     for name, torque in model.torques.items():
         ends = f"I = {ids[torque.i]}", f"J = {ids[torque.j]}"
-        yield from named_statement(
-            name, f"SFORCE/{ids[name]}", "ROTATIONAL", *ends, f"FUNCTION = {expression(torque.function)}"
-        )
+        yield from numbered("SFORCE", name, "ROTATIONAL", *ends, f"FUNCTION = {expression(torque.function)}")
     for name, held in model.motions.items():
-        how = f"JOINT = {ids[held]}", "ROTATION", "VELOCITY", "FUNCTION = 0"
-        yield from named_statement(name, f"MOTION/{ids[name]}", *how)
+        yield from numbered("MOTION", name, f"JOINT = {ids[held]}", "ROTATION", "VELOCITY", "FUNCTION = 0")
     for name, sensor in model.sensors.items():
-        yield from named_statement(
-            name, f"SENSOR/{ids[name]}", "GE", "VALUE = 0", f"ERROR = {finite(sensor.error)}",
+        yield from numbered(
+            "SENSOR", name, "GE", "VALUE = 0", f"ERROR = {finite(sensor.error)}",
             "HALT" if sensor.halts else "RETURN", f"FUNCTION = {expression(sensor.function)}",
         )  # fmt: skip
     along, up = model.gravity
@@ -134,12 +130,9 @@ def contact_arguments(contact: AdamsContact, ids: Mapping[str, int]) -> Iterator
 
 def command_text(model: AdamsModel, dataset: str, end_s: float, pinned_until_s: float | None) -> str:
     """Write the command file that simulates walkerlab's walk: a header, and the commands of `AdamsModel.commands`."""
-    head = [
-        dataset,
-        dataset.removesuffix(".adm"),
-        f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}",
-    ]
-    return "\n".join([*head, *model.commands(end_s, pinned_until_s), "stop", ""])
+    solver = f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}"
+    commands = model.commands(end_s, pinned_until_s)
+    return "\n".join([dataset, dataset.removesuffix(".adm"), solver, *commands, "stop", ""])
 
 
 Naming = Callable[[str], str]
@@ -168,10 +161,8 @@ def quote(text: str) -> str:
 
 
 def build_commands(model: AdamsModel) -> Iterator[list[str]]:
-    root = f".{model.name}"
-
     def full(name: str) -> str:
-        return f"{root}.{name}"
+        return f".{model.name}.{name}"
 
     def function(text: str) -> str:
         return quote(REFERENCE.sub(lambda match: full(match[1]), text))

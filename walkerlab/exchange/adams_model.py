@@ -207,8 +207,7 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
 
     Raises ConfigError for a contact law, ground or coupling that cannot be expressed.
     """
-    planar = export.model
-    gravity = MM * planar.gravity_along, -MM * planar.gravity_down
+    gravity = MM * export.model.gravity_along, -MM * export.model.gravity_down
     model = AdamsModel(export.model_name, gravity, markers={ORIGIN: Marker(GROUND)})
     add_bodies(model, export)
     add_ground(model, export)
@@ -252,11 +251,10 @@ def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
 
 def add_bodies(model: AdamsModel, export: Exported) -> None:
     """Add parts, markers, hinges, feet and couplers. A planar joint keeps the base in the plane of the walk."""
-    planar = export.model
     names = export.names
     q, v = ([float(x) for x in part] for part in export.start)
     frames: list[MovingFrame] = []
-    for k, (name, link) in enumerate(zip(names, planar.links, strict=True)):
+    for k, (name, link) in enumerate(zip(names, export.model.links, strict=True)):
         hinge = MovingFrame((q[0], q[1]), q[2], (v[0], v[1]), v[2])
         if link.parent >= 0:
             held = frames[link.parent].moved_to(link.parent_point_m)
@@ -279,7 +277,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
     for number, coupling in enumerate(export.couplings):
         weights = {f"hinge_of_{names[link]}": weight for link, weight in coupling.items()}
         model.couplers[f"coupler_{number + 1}"] = weights
-    for foot, ball in enumerate(planar.balls):
+    for foot, ball in enumerate(export.model.balls):
         # Parts turn only about the plane's normal, so each ball stays in its lane, at a fixed distance from the plane.
         name = names[ball.link]
         model.markers[f"{name}.foot"] = marker_at(name, ball.centre_m)
@@ -357,9 +355,8 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
     for number, pad in enumerate(export.pads):
         marker = f"{GROUND}.pad_{number + 1}"
         left = pad.centre_m - 0.5 * pad.length_m
-        ball = export.model.balls[pad.foot]
         across = export.lane_across_m(pad.foot) - export.half_lane_m
-        top = MM * (pad.height_m + ball.ground_m)
+        top = MM * (pad.height_m + export.model.balls[pad.foot].ground_m)
         model.markers[marker] = Marker(GROUND, (MM * left, top - PAD_MM, MM * across))
         size = MM * pad.length_m, PAD_MM, 2.0 * MM * export.half_lane_m
         model.shapes[f"pad_{number + 1}"] = Shape("BOX", marker, size)
@@ -378,12 +375,8 @@ def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
         )
     # Stiffness is in N/mm^e, so the factor depends on the exponent. ADAMS View scales it like force per length,
     # whatever the exponent is.
-    in_mm = Impact(
-        normal.stiffness / MM**normal.exponent,
-        normal.exponent,
-        normal.damping / MM,
-        MM * normal.full_damping_penetration,
-    )
+    k, e, c, full_damping_penetration = normal
+    in_mm = Impact(k / MM**e, e, c / MM, MM * full_damping_penetration)
     if isinstance(friction, Frictionless):
         return in_mm, None
     if not isinstance(friction, Coulomb):
@@ -450,21 +443,19 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
         # Leg 1 touches down first, so leg 2 is the first trailing leg.
-        pulses = [f"{leg}_pulse_{pulse + 1}" for pulse in range(len(export.touches_s[1 - number :: 2]))]
-        for pulse, time in zip(pulses, export.touches_s[1 - number :: 2], strict=True):
+        pulses = {f"{leg}_pulse_{pulse}": time for pulse, time in enumerate(export.touches_s[1 - number :: 2], 1)}
+        for pulse, time in pulses.items():
             begin = finite(time)
             end = finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
             # The pulse has a unit impulse. A leg without push-off needs it as well, because its knee is held during the
             # pulse.
-            force = finite(30.0 / duration)
-            model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
+            model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{finite(30.0 / duration)}*({share})**2))"
         marker = f"{{{export.names[0]}.hinge}},{{{foot.marker}}},{{{ORIGIN}}}"
         up = f"DY({marker})+{finite(foot.radius)}" if foot.radius else f"DY({marker})"
         model.variables[f"{leg}_pulses"] = "+".join(f"VARVAL({{{pulse}}})" for pulse in pulses) or "0"
         model.variables[f"{leg}_line"] = f"SQRT(DX({marker})**2+({up})**2)"
-        impulse = finite(export.impulses_N_s[number])
-        line = f"{impulse}*VARVAL({{{leg}_pulses}})/VARVAL({{{leg}_line}})"
+        line = f"{finite(export.impulses_N_s[number])}*VARVAL({{{leg}_pulses}})/VARVAL({{{leg}_line}})"
         model.variables[f"{leg}_push_x"] = f"{line}*DX({marker})"
         model.variables[f"{leg}_push_y"] = f"{line}*({up})"
 
@@ -550,15 +541,11 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
             f"{leg}_touches": Sensor(down, ERROR_MM),
             f"{leg}_on_bent_knee": replace(down_ahead, halts=True),
         }
-    hip = f"{{{export.names[0]}.hinge}}"
     lowest = FALLEN_HIP * MM * export.config.walker.leg_length_m
-    model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
+    model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({{{export.names[0]}.hinge}})", ERROR_MM, halts=True)
     # Leg 1 swings first, so only the lock of leg 2 is active at the start.
-    model.inactive = (
-        *(stop for stop in ("stop_1", "stop_2") if stop in model.torques),
-        "lock_1",
-        *(name for name in model.sensors if name != "fell"),
-    )
+    stops = [stop for stop in ("stop_1", "stop_2") if stop in model.torques]
+    model.inactive = (*stops, "lock_1", *(name for name in model.sensors if name != "fell"))
     for step in range(export.walk.steps):
         model.events += step_events(export, step % 2)
 
@@ -587,8 +574,7 @@ def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
     """Add requests named after the quantities of a walk. Angles are from the vertical, lengths in mm."""
     # ADAMS measures angles from the slope's normal.
     tilt = f"{-export.scene.ours.slope:+.17g}" if export.scene.ours.slope else ""
-    uppers = export.names[export.hip_link], export.names[0]
-    for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):
+    for foot, (leg, part) in enumerate(zip(LEGS, (export.names[export.hip_link], export.names[0]), strict=True)):
         terms = FootTerms(export, foot)
         # Components 2 and 3 of CONTACT are the forces along x and y.
         ground = ("3", "2") if law == "contact" else ("normal", "friction")

@@ -15,18 +15,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.marker_lines import (
-    MAX_VALUE,
-    Line,
-    body_doubts,
-    body_gaps,
-    find_plane,
-    frozen_rows,
-    refuse_running,
-    replace_unseen,
-    spell_rows,
-    swap_lines_back,
-)
+from walkerlab.exchange import marker_lines
 from walkerlab.exchange.recording import SEGMENTS, SI, TIME, UNIT_IN_NAME, UNIT_VALUES, Array, Recording, value_in_si
 
 LEG_QUANTITIES: Final = {
@@ -123,7 +112,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
     recording, more_notes = remove_unlikely_positions(recording, [sources[name] for name in ends], asked.min_likelihood)
     for pairs in ends.values():
-        columns_with_gaps, unseen = replace_unseen(recording.columns, pairs)
+        columns_with_gaps, unseen = marker_lines.replace_unseen(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
     # Frozen markers of lines are found later, marker by marker, see `body_gaps`.
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
@@ -135,7 +124,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
     values = {}
-    lines = dict[str, Line]()
+    lines = dict[str, marker_lines.Line]()
     for name, column in sources.items():
         try:
             refuse_gaps(recording, column, rows)
@@ -223,11 +212,11 @@ def remove_unlikely_positions(
         if re.fullmatch(rf"{re.escape(marker)}{LIKELIHOOD}", column)
     }
     if least is None:
-        low = {marker: each for marker, each in likelihoods.items() if np.any(each < DOUBTFUL_LIKELIHOOD)}
-        spelled = ", ".join(f"{marker} at {spell_rows(each < DOUBTFUL_LIKELIHOOD)}" for marker, each in low.items())
+        low = {marker: each < DOUBTFUL_LIKELIHOOD for marker, each in likelihoods.items()}
+        spelled = ", ".join(f"{name} at {marker_lines.spell_rows(rows)}" for name, rows in low.items() if rows.any())
         return recording, [
             f"Likelihoods are below {DOUBTFUL_LIKELIHOOD:g}: {spelled}. --min-likelihood turns them into gaps."
-        ] if low else []
+        ] if spelled else []
     if not likelihoods:
         raise ConfigError(
             f"{recording.path} has no likelihoods of {' and '.join(markers) or 'markers'}.",
@@ -251,8 +240,7 @@ def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recordin
         if name in recording.problems:
             continue
         values = recording.columns[name]
-        frozen = frozen_rows(values[:, None])
-        if frozen.any():
+        if (frozen := marker_lines.frozen_rows(values[:, None])).any():
             columns = recording.columns | {name: np.where(frozen, np.nan, values)}
             recording = replace(recording, columns=columns, unseen=recording.unseen | {name: "it stands still there"})
     return recording
@@ -283,29 +271,25 @@ def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> 
 
 
 def add_lines(
-    walk: RecordedWalk, lines: Mapping[str, Line], constants: Mapping[str, float], source: str
+    walk: RecordedWalk, lines: Mapping[str, marker_lines.Line], constants: Mapping[str, float], source: str
 ) -> RecordedWalk:
     """Add the angles of lines between markers (by quantity) to a walk.
 
     Raises ConfigError if the recording shows running, not walking.
     """
-    lines, swaps = swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
+    lines, swaps = marker_lines.swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
     named = {walk.sources[name]: line for name, line in lines.items()}
-    off, jumps = body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
+    off, jumps = marker_lines.body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
     lines = {name: (top[~off], bottom[~off]) for name, (top, bottom) in lines.items()}
     walk = select_rows(walk, ~off)
-    plane = find_plane(lines, walk.walks)
-    refuse_running(lines, plane, source)
+    plane = marker_lines.find_plane(lines, walk.walks)
+    marker_lines.refuse_running(lines, plane, source)
     angles = {name: plane.angle(line) + constants.get(name, 0.0) for name, line in lines.items()}
     hip = next(iter(lines.values()))[0] @ plane.ahead
-    doubts = (
-        *walk.doubts,
-        *swaps,
-        *jumps,
-        *body_doubts({walk.sources[name]: line for name, line in lines.items()}, plane),
-    )
+    changes = marker_lines.body_doubts({walk.sources[name]: line for name, line in lines.items()}, plane)
     gaps = "; ".join(text.removesuffix(".") for text in (walk.gaps, *jumps) if text)
     quantities = {**walk.quantities, **angles, HIP_OF_LINES: hip}
+    doubts = (*walk.doubts, *swaps, *jumps, *changes)
     return replace(walk, quantities=quantities, lines=tuple(lines), doubts=doubts, gaps=gaps)
 
 
@@ -316,10 +300,14 @@ def select_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
-    """Return the columns of the upper and lower end of a line for each coordinate, or nothing if it is not a line."""
+    """Return the columns of the upper and lower end of a line for each coordinate, x, y or z, that both markers have.
+
+    Return nothing if it is not a line. Raises ConfigError if a marker is missing.
+    """
     # The name of a column may itself contain '>'.
-    ends = None if source in recording.columns else LINE.fullmatch(source)
-    return line_columns(recording, ends[1], ends[2]) if ends else []
+    line = None if source in recording.columns else LINE.fullmatch(source)
+    top, bottom = (axes_of(recording, marker) for marker in line.groups()) if line else ({}, {})
+    return [(top[axis], bottom[axis]) for axis in "xyz" if axis in top and axis in bottom]
 
 
 def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
@@ -351,7 +339,7 @@ def rows_without_gaps(
     used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
         refuse_problem(recording, column)
-    finite = {column: np.abs(recording.columns[column]) < MAX_VALUE for column in used}
+    finite = {column: np.abs(recording.columns[column]) < marker_lines.MAX_VALUE for column in used}
     whole = rows & np.all(list(finite.values()), axis=0)
     if not whole.any():
         raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")
@@ -363,7 +351,7 @@ def rows_without_gaps(
     for column in used:
         if (lacking := inside & ~finite[column]).any():
             reason = f" ({recording.unseen[column]})" if column in recording.unseen else ""
-            gaps.setdefault(f"{spell_rows(lacking)}{reason}", []).append(column)
+            gaps.setdefault(f"{marker_lines.spell_rows(lacking)}{reason}", []).append(column)
     spelled = "; ".join(f"{', '.join(columns)} at {place}" for place, columns in gaps.items())
     return whole, cut, f"Gaps are left out: {spelled}" if gaps else ""
 
@@ -382,8 +370,7 @@ def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | sli
     for column in columns_of(recording, source):
         refuse_problem(recording, column)
         values = recording.columns[column]
-        gaps = np.arange(values.size)[rows][~np.isfinite(values[rows])]
-        if gaps.size:
+        if (gaps := np.arange(values.size)[rows][~np.isfinite(values[rows])]).size:
             raise ConfigError(
                 f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
                 f"{gaps[0] + 1}.",
@@ -395,8 +382,7 @@ def refuse_order(path: Path, time: Array) -> None:
     """Raise ConfigError unless there are at least two times, in strictly ascending order."""
     if time.size < 2:
         raise ConfigError(f"{path} has {time.size} samples, but a walk needs at least two.", "Record a longer walk.")
-    steps_back = np.flatnonzero(np.diff(time) <= 0.0)
-    if steps_back.size:
+    if (steps_back := np.flatnonzero(np.diff(time) <= 0.0)).size:
         row = int(steps_back[0])
         raise ConfigError(
             f"{path}: time does not increase from sample {row + 1} ({time[row]:.9g} s) "
@@ -509,15 +495,6 @@ def columns_of(recording: Recording, source: str) -> list[str]:
     return [source]
 
 
-def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str, str]]:
-    """Return the two columns of each coordinate, x, y or z, that both markers have.
-
-    Raises ConfigError if a marker is missing.
-    """
-    ends = [axes_of(recording, marker) for marker in (top, bottom)]
-    return [(ends[0][axis], ends[1][axis]) for axis in "xyz" if axis in ends[0] and axis in ends[1]]
-
-
 def axes_of(recording: Recording, marker: str) -> dict[str, str]:
     """Return the column of each coordinate of a marker, such as HIP.x, HIP X, HIP.PosX or HIP[:,0]."""
     pattern = re.compile(rf"{re.escape(marker)}(?:(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))|\[(?::,)?([012])\])")
@@ -588,8 +565,7 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
             f"{recording.path} states no unit for {source!r} ({name}).",
             f"Add --units {kind}={SI[kind]}, or another unit: {', '.join(list(UNIT_VALUES[kind])[:6])}.",
         )
-    value = value_in_si(unit, kind)
-    if value is None:
+    if (value := value_in_si(unit, kind)) is None:
         raise unknown_unit_error(recording, unit, name, kind)
     return value
 
@@ -640,7 +616,9 @@ def rate_unit(units: Mapping[str, str], kind: str) -> str:
     return f"{unit}/s" if unit else ""
 
 
-def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> Line:
+def places_of_ends(
+    recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]
+) -> marker_lines.Line:
     """Return the positions (samples, axes) of both ends of a line in m, or as recorded if their unit is unknown."""
     scale = scale_of_line(recording, pairs, units) or {}
     top, bottom = (

@@ -55,8 +55,7 @@ def export_model(
     export = exported.prepare_export(locked, start)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
-    tilted = "gravity" if slope == "gravity" else "ground"
-    head = list(export.describe(left_out, commit, tilted))
+    head = list(export.describe(left_out, commit, "gravity" if slope == "gravity" else "ground"))
     if kind == "mjcf":
         script = {f"{stem}.py": mjcf.script_text()} if mjcf.parts_of_script(export) else {}
         return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head, slope)} | script, left_out)
@@ -67,11 +66,11 @@ def export_model(
     model = adams_model(export, law)
     pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
     if kind == "cmd":
-        return ExportedFiles({f"{stem}.cmd": adams.view_text(model, head, export.end_s, pinned_until_s)}, left_out)
+        text = adams.view_text(model, head, export.walk.end_time_s, pinned_until_s)
+        return ExportedFiles({f"{stem}.cmd": text}, left_out)
     dataset = f"{stem}.adm"
-    commands = adams.command_text(model, dataset, export.end_s, pinned_until_s)
-    files = {dataset: adams.dataset_text(model, head), f"{stem}.acf": commands}
-    return ExportedFiles(files, left_out)
+    commands = adams.command_text(model, dataset, export.walk.end_time_s, pinned_until_s)
+    return ExportedFiles({dataset: adams.dataset_text(model, head), f"{stem}.acf": commands}, left_out)
 
 
 def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Choice:
@@ -114,8 +113,7 @@ def parts_left_out(export: exported.Exported, config: "Config", kind: Kind, law:
     if export.scene.ground.terrain.has_pads:
         yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"
     if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
-        millimetres = 1e3 * planar.SMALLEST_BALL_M
-        yield f"point feet, replaced by balls of {millimetres:g} mm on ground lower by the same amount"
+        yield f"point feet, replaced by balls of {1e3 * planar.SMALLEST_BALL_M:g} mm on ground lower by the same amount"
     if kind == "mjcf":
         if parts := mjcf.parts_of_script(export):
             yield f"{', '.join(parts)}, which the script {script} applies instead"

@@ -1,6 +1,5 @@
 """Walker to export, on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
-import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -158,10 +157,6 @@ class Exported:
         return [float(time) for time in self.walk.touch_time_s]
 
     @property
-    def end_s(self) -> float:
-        return float(self.walk.end_time_s)
-
-    @property
     def model_name(self) -> str:
         return identifier(self.config.name)
 
@@ -222,5 +217,4 @@ def refuse(config: "Config") -> None:
 
 def finite(value: float) -> str:
     """Format a number with all its digits, without a trailing `.0`."""
-    text = repr(float(value))
-    return "0" if float(value) == 0.0 else text.removesuffix(".0") if math.isfinite(value) else text
+    return "0" if float(value) == 0.0 else repr(float(value)).removesuffix(".0")

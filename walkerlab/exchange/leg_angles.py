@@ -124,9 +124,8 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
             )
         walk = replace(walk, quantities={**walk.quantities, name: angle})
         if half_turns % 2:
-            walk = add_doubt(
-                walk, f"{name.capitalize()} is measured from the upward vertical, so 180 degrees are subtracted."
-            )
+            doubt = f"{name.capitalize()} is measured from the upward vertical, so 180 degrees are subtracted."
+            walk = add_doubt(walk, doubt)
     return walk
 
 
@@ -165,10 +164,9 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
             f"{numbers[jump.first]:.0f} (time {walk.time_s[jump.first]:.6g} s)"
             for jump in jumps[:MAX_NAMED]
         )
-        kept = f"from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s"
         doubt = (
             f"As if a sensor had slipped, there is a lasting jump: {spelled}. Only the longest part without one is "
-            f"kept, {kept}."
+            f"kept, from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s."
         )
         walk = add_doubt(walk, doubt)
         rows[:begin] = rows[end:] = False
@@ -203,9 +201,8 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
     kept = f"the longest stretch in one direction, from {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
-    return select_rows(
-        add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
-    )
+    walk = add_doubt(walk, f"The walk turns round at time {spelled}: {kept}.")
+    return select_rows(walk, (begin <= rows) & (rows <= end))
 
 
 def find_ways(time: Array, angle: Array) -> list[Way]:
@@ -240,8 +237,7 @@ def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
     """
     begin = before.passings[-1][1]
     end = after.passings[0][0]
-    hip = walk.quantities.get(HIP_OF_LINES)
-    if hip is None:
+    if (hip := walk.quantities.get(HIP_OF_LINES)) is None:
         return (begin + end) // 2
     return begin + int(np.argmax(hip[begin : end + 1] * (1.0 if before.forwards else -1.0)))
 
@@ -339,10 +335,8 @@ class Strike:
         # To save time, try long stretches only at widely spaced positions. The best one is refined below.
         short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
         inner = np.arange(*self.inner_samples(LASTING_BORDER, whole=False))
-        count = self.time.size
-        lasting = first_and_end(inner, count - inner)
-        spans = np.concatenate((short[short[:, 1] <= high], lasting))
-        first, end, leg = best_span(sums, spans)
+        lasting = first_and_end(inner, self.time.size - inner)
+        first, end, leg = best_span(sums, np.concatenate((short[short[:, 1] <= high], lasting)))
         lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
         if not lasts:
             # Try all spans whose ends are near those of the best one.
@@ -428,9 +422,8 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     # Polynomials through sparse samples would also follow errors.
     if not sampled or np.max(np.diff(time)) > MAX_GAP * course.step_s:
         return found
-    scatter = MAD_TO_DEVIATION * float(
-        np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes])))
-    )
+    residuals = np.concatenate([strike.scatter().ravel() for strike in strikes])
+    scatter = MAD_TO_DEVIATION * float(np.median(np.abs(residuals)))
     worst = [strike.best_stretch(strike.smooth_fit).explained for strike in strikes]
     limit = max((STANDARD_ERRORS * scatter) ** 2, MIN_EXPLAINED_RATIO * float(np.percentile(worst, TYPICAL_PERCENT)))
     # A false strike in one step makes the neighbouring steps look wrong as well.
@@ -472,8 +465,7 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
         explains = float(np.sum(strike.smooth_fit[1] ** 2)) - left > limit
         if not explains or abs(stretch.offset_rad) < smallest:
             return None
-        rows = strike.rows
-        return replace(stretch, first=int(rows[stretch.first]), end=int(rows[stretch.end - 1]) + 1)
+        return replace(stretch, first=int(strike.rows[stretch.first]), end=int(strike.rows[stretch.end - 1]) + 1)
 
     found: list[Stretch] = []
     while len(found) < MAX_STRETCHES and (stretch := worst(found)):
@@ -566,20 +558,16 @@ def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> C
     """
     course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
     time = course.time
-    angle = course.angle
-    spread = angle[:, 0] - angle[:, 1]
+    spread = course.angle[:, 0] - course.angle[:, 1]
     far = WINDOW_AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
     apart = apart_runs(np.abs(spread) > far, spread > 0.0)
-    shortest = MIN_TIME_AHEAD * float(
-        np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT)
-    )
+    durations = [time[last] - time[first] for first, last in apart] or [0.0]
+    shortest = MIN_TIME_AHEAD * float(np.percentile(durations, FAR_PERCENT))
     runs: list[tuple[int, int]] = []
     for first, last in apart:
         # Outliers make brief runs, and can divide one run into two.
-        whole = time[last] - time[first] >= shortest or first == 0 or last == time.size - 1
-        goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
-        if whole:
+        if time[last] - time[first] >= shortest or first == 0 or last == time.size - 1:
+            goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
             runs[len(runs) - goes_on :] = [(runs[-1][0] if goes_on else first, last)]
     spans = [(float(time[first]), float(time[last])) for first, last in runs]
-    step_s = typical_interval([0.5 * (begin + end) for begin, end in spans], time)
-    return replace(course, spans=spans, step_s=step_s)
+    return replace(course, spans=spans, step_s=typical_interval([0.5 * (begin + end) for begin, end in spans], time))

@@ -4,9 +4,7 @@ The walk is along the horizontal line on which the legs move most relative to ea
 of the walk along this line shows only when the legs pass each other (see `leg_angles`).
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -57,31 +55,21 @@ class WalkPlane:
         return np.asarray(np.arctan2(across @ self.ahead, np.abs(across @ self.up)))
 
 
-def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Describe the samples that `rows` (samples,) marks, by their numbers in the file and their times."""
-
-    def spell_times(first: int, last: int) -> str:
-        return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
-
-    return spell_numbers(numbers, rows, spell_times)
-
-
 def spell_rows(rows: NDArray[np.bool_]) -> str:
     """Describe the samples that `rows` (samples,) marks, by their numbers counted from 1."""
-    return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
+    return spell_samples(None, np.arange(1.0, rows.size + 1.0), rows)
 
 
-def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
-    """Describe the samples that `rows` (samples,) marks, by their `numbers` (samples,).
-
-    If given, `addition(first, last)` returns a text to append to each stretch.
-    """
+def spell_samples(time: Array | None, numbers: Array, rows: NDArray[np.bool_]) -> str:
+    """Describe the samples that `rows` (samples,) marks, by their numbers in the file and, if given, their times."""
     runs = apart_runs(rows, rows)
-    places = [
-        (f"sample {numbers[first]:.0f}" if first == last else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}")
-        + (addition(first, last) if addition else "")
-        for first, last in runs[:MAX_NAMED]
-    ]
+    places = []
+    for first, last in runs[:MAX_NAMED]:
+        alone = first == last
+        place = f"sample {numbers[first]:.0f}" if alone else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}"
+        if time is not None:
+            place += f" (time {time[first]:.6g}{'' if alone else f' to {time[last]:.6g}'} s)"
+        places.append(place)
     return ", ".join(places) + (f" and {len(runs) - MAX_NAMED} more places" if len(runs) > MAX_NAMED else "")
 
 
@@ -184,9 +172,8 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
         ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
         # A marker that jumps sideways would otherwise turn the plane.
         off = np.abs(motion @ sideways - np.median(motion @ sideways))
-        motion = motion[
-            off <= MIN_JUMP * MAD_TO_DEVIATION * np.median(off) + MIN_RELATIVE_JUMP * np.ptp(motion @ ahead)
-        ]
+        limit = MIN_JUMP * MAD_TO_DEVIATION * np.median(off) + MIN_RELATIVE_JUMP * np.ptp(motion @ ahead)
+        motion = motion[off <= limit]
     drift = float((legs[0][0][-1] - legs[0][0][0]) @ ahead)
     return WalkPlane(up, ahead if drift > 0.0 else -ahead)
 
@@ -232,8 +219,7 @@ def replace_unseen(
             alike[first : last + 1] = np.any(np.abs(length[first : last + 1] - usual) > allowed)
         if alike.any():
             value = ", ".join(f"{each:g}" for each in place[:, np.argmax(alike)])
-            text = f"({value}) is taken for 'not seen'"
-            unseen |= dict.fromkeys(names, text)
+            unseen |= dict.fromkeys(names, f"({value}) is taken for 'not seen'")
             gaps |= {name: np.where(alike, np.nan, gaps[name]) for name in names}
     return gaps, unseen
 
@@ -265,11 +251,9 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
     off = np.zeros(time.size, bool)
     doubts = []
     for name, (top, bottom) in lines.items():
-        frozen = frozen_rows(top) | frozen_rows(bottom)
-        if frozen.any():
-            doubts.append(
-                f"A marker of {name} stands still at {spell_samples(time, numbers, frozen)}, which is left out."
-            )
+        if (frozen := frozen_rows(top) | frozen_rows(bottom)).any():
+            places = spell_samples(time, numbers, frozen)
+            doubts.append(f"A marker of {name} stands still at {places}, which is left out.")
             off |= frozen
         length = np.linalg.norm(top - bottom, axis=1)
         if length.size <= NEIGHBOURS:
@@ -277,9 +261,8 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         change = np.diff(length)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(change, NEIGHBOURS // 2, "edge"), NEIGHBOURS)
         sudden = change - np.median(around, axis=1)
-        limit = max(
-            MIN_JUMP * MAD_TO_DEVIATION * float(np.median(np.abs(sudden))), MIN_RELATIVE_JUMP * float(np.median(length))
-        )
+        usual = float(np.median(np.abs(sudden)))
+        limit = max(MIN_JUMP * MAD_TO_DEVIATION * usual, MIN_RELATIVE_JUMP * float(np.median(length)))
         jumps = np.flatnonzero(np.abs(sudden) > limit).tolist()
         brief = np.zeros(length.size, bool)
         lasting = np.zeros(length.size, bool)
@@ -293,9 +276,8 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         if brief.any():
             doubts.append(f"The length of {name} is off at {spell_samples(time, numbers, brief)}, which is left out.")
         if lasting.any():
-            doubts.append(
-                f"The length of {name} jumps at {spell_samples(time, numbers, lasting)}, and does not return."
-            )
+            places = spell_samples(time, numbers, lasting)
+            doubts.append(f"The length of {name} jumps at {places}, and does not return.")
         off |= brief
     return off, doubts
 

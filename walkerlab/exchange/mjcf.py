@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -69,13 +69,8 @@ class Foot:
 FEET = (Foot("foot 0"), Foot("foot 1"))
 
 
-class Hinge(NamedTuple):
-    """Name and other attributes of a hinge."""
-
-    name: str
-    attributes: str
-
-
+Hinge = tuple[str, str]
+"""Name and other attributes of a hinge."""
 UNNAMED: Mapping[int, Hinge] = {}
 
 
@@ -216,8 +211,7 @@ def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: 
     creep = inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
     return (
         f'<pair name="{foot.name} on {ground}" geom1="{foot.name}" geom2="{ground}" condim="3" '
-        f'friction="{mu!r} {mu!r} 0 0 0" '
-        f'solreffriction="0 {-creep!r}" {normal_text(model, ball, contact)}/>'
+        f'friction="{mu!r} {mu!r} 0 0 0" solreffriction="0 {-creep!r}" {normal_text(model, ball, contact)}/>'
     )
 
 
@@ -238,8 +232,7 @@ def walker_text(export: exported.Exported, head: Iterable[str], slope: Slope = "
 
     Raises ConfigError for a walker or ground that MJCF cannot express.
     """
-    target = engine_scene.contact_target(export.scene)
-    if target is None:
+    if (target := engine_scene.contact_target(export.scene)) is None:
         raise ConfigError(
             "MuJoCo's contact cannot be tuned to ground without friction.", "Set contact.friction=coulomb."
         )
@@ -254,16 +247,11 @@ def walker_text(export: exported.Exported, head: Iterable[str], slope: Slope = "
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
     # The camera is far enough from the plane of the walk to show a whole step.
     distance = -4.0 * export.config.walker.leg_length_m
-    scene = "".join(
-        (
-            *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
-            body_text(model, 0, contact, feet, hinge_names(export)),
-        )
-    )
+    scene = "".join(pad_text(export, number, pad) for number, pad in enumerate(export.pads))
+    scene += body_text(model, 0, contact, feet, hinge_names(export))
     if slope == "geometry":
         half = 0.5 * export.scene.ours.slope
-        down = math.hypot(model.gravity_along, model.gravity_down)
-        model = replace(model, gravity_along=0.0, gravity_down=down)
+        model = replace(model, gravity_along=0.0, gravity_down=math.hypot(model.gravity_along, model.gravity_down))
         # Positive turns about the y axis lower the ground ahead.
         scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
     pairs = "".join(
@@ -304,11 +292,10 @@ def time_step_s(export: exported.Exported, contact: Mapping[str, float]) -> floa
 
 def hinge_names(export: exported.Exported) -> dict[int, Hinge]:
     """Return the hinges of hip and knees, with names, the hip spring, dampers and the stops of compliant knees."""
-    hip = export.hip
     weights = inverse_weights(export.model).joints
     stop = export.scene.ours.stop
-    acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'
-    hinges = {export.hip_link: Hinge(HIP, acts)}
+    acts = f'stiffness="{export.hip.spring_N_m_per_rad!r}" damping="{export.hip.damping_N_m_s_per_rad!r}"'
+    hinges = {export.hip_link: (HIP, acts)}
     for leg, link in enumerate(export.knee_links):
         acts = f'damping="{knee_dampings(export.config.walker)[leg]!r}" '
         d = IMPEDANCE
@@ -316,7 +303,7 @@ def hinge_names(export: exported.Exported) -> dict[int, Hinge]:
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
             # Knees bend towards negative angles. Their lower limit is too far away to act.
             acts += f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
-        hinges[link] = Hinge(f"knee_{leg + 1}", acts)
+        hinges[link] = (f"knee_{leg + 1}", acts)
     return hinges
 
 
@@ -324,12 +311,11 @@ def limbs(export: exported.Exported, foot: int) -> dict[int, Position]:
     """Return the lower end (m) of each link of a leg, from its foot up to the hip."""
     ball = export.model.balls[foot]
     link = ball.link
-    end = ball.centre_m
-    ends = {ball.link: ball.centre_m}
+    ends = {link: ball.centre_m}
     while link not in (0, export.hip_link):
-        end = export.model.links[link].parent_point_m
-        link = export.model.links[link].parent
-        ends[link] = end
+        lower = export.model.links[link]
+        link = lower.parent
+        ends[link] = lower.parent_point_m
     return ends
 
 
@@ -359,13 +345,11 @@ def pad_text(export: exported.Exported, number: int, pad: exported.Pad) -> str:
 def custom_texts(export: exported.Exported) -> Iterator[str]:
     """Yield the values that the script reads: drives, rules of the knees, periods and lengths of walkerlab's steps."""
     first, second = export.impulses_N_s
-    hip = export.hip
     walk = export.walk
     yield f'<numeric name="push_off" data="{first!r} {second!r} {export.config.push_off.duration_s!r}"/>'
-    yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
+    yield f'<numeric name="hip_torque" data="{export.hip.torque_N_m!r}"/>'
     if export.knee_links:
-        at_touch = int(export.scene.ours.whole.release_at_touch)
-        yield f'<numeric name="knees" data="{knees.MIN_FLEXION!r} {at_touch}"/>'
+        yield f'<numeric name="knees" data="{knees.MIN_FLEXION!r} {int(export.scene.ours.whole.release_at_touch)}"/>'
     steps = (walk.periods_s, walk.lengths_m) if walk.steps else ((0.0,), (0.0,))
     values = " ".join(repr(float(value)) for values in steps for value in values)
     yield f'<numeric name="steps_in_walkerlab" data="{values}"/>'
@@ -400,7 +384,6 @@ def coupling_texts(export: exported.Exported) -> Iterator[str]:
 
 def tuning_lines(export: exported.Exported, target: engine_scene.EngineContact) -> Iterator[str]:
     """Describe which properties of the contact law MuJoCo's contact reproduces, and which it lacks."""
-    static = float(export.scene.ours.friction.largest)
     yield (
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "
         f"damping ratio {target.damping_ratio:.4g}, friction coefficient {target.friction:.4g} of a sliding foot, "
@@ -409,7 +392,7 @@ def tuning_lines(export: exported.Exported, target: engine_scene.EngineContact) 
     )
     yield (
         f"Not expressed: the exponent {target.exponent:.4g} (the force is linear), damping that grows with the "
-        f"penetration, and static friction of {static:.4g}."
+        f"penetration, and static friction of {float(export.scene.ours.friction.largest):.4g}."
     )
 
 

@@ -81,12 +81,9 @@ THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
 COMMAS_AND_BLANKS: Final = re.compile(r" *[-+]?\d+,\d+(?: +[-+]?\d+,\d+(?:[eE][-+]?\d+)?)+ *")
 DECLARED_ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)""")
-CLOCKS: Final = tuple(
-    re.compile(pattern)
-    for pattern in (
-        r"(?:(\d+) days? )?(?:(\d+):)?(\d+):(\d\d(?:\.\d+)?)",
-        r"P(?:(\d+)D)?T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?",
-    )
+CLOCKS: Final = (
+    re.compile(r"(?:(\d+) days? )?(?:(\d+):)?(\d+):(\d\d(?:\.\d+)?)"),
+    re.compile(r"P(?:(\d+)D)?T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?"),
 )
 """Patterns of durations, as on a clock (1:02:03) and in ISO 8601 (PT1H2M3S)."""
 DAY_S: Final = 86400.0
@@ -175,8 +172,7 @@ def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    if (reader := READERS.get(path.suffix.lower())) is None:
         raise ConfigError(
             f"{path} has an unsupported format ({path.suffix or 'no extension'}).",
             FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {ACCEPTED_FORMATS}."),
@@ -195,8 +191,7 @@ def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, .
         mode = path.stat().st_mode
         # A folder is not refused here, because the attempt to read it raises an OSError with the right reason.
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            advice = "Save its output as a file first."
-            raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
+            raise ConfigError(f"{name} is a pipe or a device, not a file.", "Save its output as a file first.", key)
         return reader(path)
     except OSError as error:
         reason = NO_FILE if isinstance(error, FileNotFoundError) else error.strerror or error
@@ -233,8 +228,9 @@ def read_delimited(path: Path) -> Recording:
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
     lines = merge_headers(remove_blanks(text.splitlines()))
     delimiter, header, unit_row, first = find_header(path, lines)
-    names, units = names_and_units(header)
-    names = [name or f"column {number}" for number, name in enumerate(names, 1)]
+    # Units are in brackets behind the names.
+    units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
+    names = [UNIT_IN_NAME.sub("", name).strip() or f"column {number}" for number, name in enumerate(header, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
     return table_of(path, names, lines, first, delimiter, stated)
 
@@ -366,12 +362,6 @@ def is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Split column headers into names and the units in brackets, which are empty if absent."""
-    units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
-    return [UNIT_IN_NAME.sub("", name).strip() for name in header], units
 
 
 def table_of(
@@ -675,7 +665,6 @@ READERS: Final[dict[str, Callable[[Path], Recording]]] = {
 }
 FORMAT_ADVICE: Final = {
     ".req": "Request files differ between versions of ADAMS. Export .res (RESULTS/XRF) or a table instead.",
-    ".xlsx": "Save the sheet as CSV.",
-    ".xls": "Save the sheet as CSV.",
+    **dict.fromkeys((".xlsx", ".xls"), "Save the sheet as CSV."),
     ".mat": "Export the columns as CSV.",
 }

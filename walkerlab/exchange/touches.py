@@ -9,8 +9,6 @@ Measured from the slope's normal, the leg angles are opposite at heel strike. An
 their sum non-zero where the rates jump: `sums_at_jumps` finds it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -115,8 +113,7 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     located = fit_together([locate_touch(time, angle, height, crossing, leg, period) for crossing, leg, _ in merged])
     # A fit may move a crossing near the first sample to a time before the recording.
     touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
-    first = touch_at_start(time, angle, height, period)
-    if first is not None:
+    if (first := touch_at_start(time, angle, height, period)) is not None:
         touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + MIN_CROSSING_INTERVAL * period)]
     slowest = MIN_FALL_SPEED * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
     return [touch for touch in touches if touch.fall_m_s >= slowest]
@@ -455,9 +452,8 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
 def noise_of(angle: Array) -> float:
     """Return the standard deviation (rad) of the scatter of angles (samples, 2) from sample to sample."""
     # Third differences hardly contain the smooth motion. Their variance is 20 times that of the noise.
-    return (
-        float(np.median(np.abs(np.diff(angle, 3, axis=0)))) / (NORMAL_QUARTILE * 20.0**0.5) if len(angle) > 3 else 0.0
-    )
+    changes = np.abs(np.diff(angle, 3, axis=0))
+    return float(np.median(changes)) / (NORMAL_QUARTILE * 20.0**0.5) if changes.size else 0.0
 
 
 def typical_interval(instants: Sequence[float], time: Array) -> float:

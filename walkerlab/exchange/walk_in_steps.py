@@ -199,8 +199,7 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
     share = way / float(steps.length_m.sum())
     doubts = steps.doubts
     if abs(share - 1.0) > MAX_BELT_DIFFERENCE:
-        doubts = (
-            *doubts,
+        doubts += (
             f"The distance over the belt is {share:.3g} times the one that follows from the leg angles: the speed of "
             "the belt, the length of the leg or the unit of time may be wrong.",
         )
@@ -478,17 +477,17 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time = walk.time_s - origin
     # The sample at a strike begins the next step, so the last sample of a step lies just before it.
-    side = STRIKE_MARGIN * float(times[-1])
-    spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
+    margin = STRIKE_MARGIN * float(times[-1])
+    spans = list(zip((0.0, *times), (*(times - margin), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
     # At the ends of a step, the fits of the heel strikes are more accurate than the spline.
     for number, (_, angles, velocities) in enumerate(pieces):
-        for row, touch, rates in end_fits(touches, number):
+        for row, touch, side in zip((0, -1), touches[number : number + 2], ("after", "before"), strict=False):
             angles[row] = touch.fit.angle[order]
-            if velocity is None and rates is not None:
-                velocities[row] = rates[order]
+            if velocity is None and side in touch.fit.rates:
+                velocities[row] = touch.fit.rates[side][order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     lengths = lengths_from_angles(model.exchanged if swapped else model, angles_rad, step, len(times))
@@ -497,14 +496,6 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
     return RecordedSteps(
         times_s, step, angles_rad, velocities_rad_s, times, errors, lengths, scatter, swapped, origin, doubts
     )
-
-
-def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return, for each recorded end of a step, the row of its sample, the heel strike, and the rates in the step."""
-    ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
-    if step + 1 < len(touches):
-        ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
-    return ends
 
 
 def is_recorded_beyond(time: Array, touches: Array) -> bool:

@@ -28,7 +28,7 @@ from walkerlab.evidence.benchmarks.references import (
     walk_by_taylor,
 )
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
-from walkerlab.evidence.paper.walker import compass
+from walkerlab.evidence.paper.appendix_a import compass
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.store.content import rows_group
 from walkerlab.pipeline.store.files import Checkpoint

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from engine_scenes import compass, kneed, limping, one_knee
 
+from walkerlab.evidence.benchmarks.engines import runs
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
 from walkerlab.evidence.benchmarks.engines.mujoco import model_xml, tune
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
-from walkerlab.evidence.benchmarks.engines.runs import SwingTask, TuningTask, WalkTask, pinned_model
+from walkerlab.evidence.benchmarks.engines.runs import TuningTask, WalkTask, pinned_model
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.exchange.mjcf import inverse_weights
 from walkerlab.physics.ground.walker import BENT, LOCKED
@@ -37,8 +38,7 @@ def free_swing(walker):
 def swing(engine, integrator, step_s, tolerance=None, walker=compass):
     scene, start, truth, energy = free_swing(walker)
     stepping = Stepping(integrator, step_s, tolerance)
-    task = SwingTask(engine.name, stepping, pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000)
-    end = task.run().end
+    end = runs.swing(engine.name, stepping, pinned_model(scene), scene.ours.slope, start, SWING_S, 10_000).end
     return float(np.max(np.abs(end - truth))), abs(energy(end) - energy(start))
 
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
-from walkerlab.evidence.benchmarks.engines.runs import SwingTask
+from walkerlab.evidence.benchmarks.engines.runs import swing
 from walkerlab.exchange.planar import PINNED, planar_model
 from walkerlab.physics.mechanics.parts import Anchor
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
@@ -52,6 +52,6 @@ def test_free_knee_swing_converges_to_the_rigid_model_at_the_stated_order(name, 
         errors = []
         for step_s in (COARSE_S, 0.5 * COARSE_S):
             stepping = Stepping(integrator, step_s)
-            task = SwingTask(name, stepping, model, SLOPE, body_by_body(START), SWING_S, 10_000)
-            errors.append(float(np.max(np.abs(task.run().end - ours))))
+            end = swing(name, stepping, model, SLOPE, body_by_body(START), SWING_S, 10_000).end
+            errors.append(float(np.max(np.abs(end - ours))))
         assert np.log2(errors[0] / errors[1]) == pytest.approx(entry.order, abs=0.25), integrator

@@ -9,13 +9,11 @@ import pytest
 
 from walkerlab.config.drives import Hip
 from walkerlab.config.loader import load
-from walkerlab.evidence.paper.appendix_a import impact
-from walkerlab.evidence.paper.walker import compass
+from walkerlab.evidence.paper.appendix_a import compass, impact
 from walkerlab.evidence.verification.catalogue import config_of, package_cases, scale_config, to_twin
 from walkerlab.evidence.verification.judge import time_difference
 from walkerlab.evidence.verification.starts import (
     RigidMasses,
-    case_tolerances,
     energy_gain,
     feet_off_the_slope,
     prepare_start,
@@ -38,7 +36,7 @@ MASSES = RigidMasses(assembly_of(PAPER.walker, rigid=True), PAPER.slope_rad)
 @pytest.fixture(scope="module")
 def judged_walk():
     start = prepare_start(PAPER, CASE)
-    return start.walk(CASE, case_tolerances(start, CASE))
+    return start.walk(CASE, start.tolerances(CASE))
 
 
 @pytest.fixture(scope="module")

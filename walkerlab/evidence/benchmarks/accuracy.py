@@ -22,7 +22,7 @@ from walkerlab.evidence.benchmarks.trials import (
     stiff_ground_trial,
 )
 from walkerlab.evidence.benchmarks.words import words
-from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.evidence.paper.appendix_a import compass_or_none
 from walkerlab.labels import Label, labels_of
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import scale_rates
@@ -31,6 +31,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.pipeline.store.files import Checkpoint, Numbers
+from walkerlab.scene.omissions import omission
 from walkerlab.scene.rigid import rigid_walker
 
 # The sizes of runs below are counted in right-hand sides.
@@ -108,13 +109,10 @@ def unit_name(*parts: object) -> str:
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     """Run a method at tighter and tighter tolerances until it is too expensive. Runs in the checkpoint are reused."""
-    ladder = OWN_LADDER
-    budget = RUN_BUDGET
-    last = RUN_BUDGET
-    if method not in METHODS or not METHODS[method].compiled:
-        ladder = LIBRARY_LADDER
-        budget = LIBRARY_RUN_BUDGET
-        last = LAST_RUN_SIZE
+    compiled = method in METHODS and METHODS[method].compiled
+    ladder = OWN_LADDER if compiled else LIBRARY_LADDER
+    budget = RUN_BUDGET if compiled else LIBRARY_RUN_BUDGET
+    last = RUN_BUDGET if compiled else LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
@@ -148,7 +146,6 @@ def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
     end = reference.reference_for(ascent.method)
     result = run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
-    below_agreement = error is not None and error <= reference.agreement
     return MethodRow(
         scene=ascent.trial.name,
         method=ascent.method,
@@ -156,7 +153,7 @@ def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
         outcome=result.outcome,
         error=error,
         against=end.method,
-        within_reference=below_agreement,
+        within_reference=error is not None and error <= reference.agreement,
         wall_s=median(run.walls_s),
         least_wall_s=min(run.walls_s),
         largest_wall_s=max(run.walls_s),
@@ -182,11 +179,7 @@ RIGID_TRIAL_STEPS = 10
 CONTACT_TRIAL_STEPS = 10
 NEAR_RIGID_STEPS = 4
 SLOW_CONTACT_STEPS = 4  # for walkers other than the compass, whose right-hand sides take several times as long
-OMISSION_OFF_COMPASS = {
-    "what": "accuracy of the scene contact-near-rigid",
-    "why": "only the compass has it",
-    "saves": "a minute",
-}
+OMISSION_OFF_COMPASS = omission("accuracy of the scene contact-near-rigid", "only the compass has it", "a minute")
 START_RATE_FACTOR = 0.98  # factor applied to the gait's velocities, because on the gait itself all steps are the same
 
 
@@ -194,7 +187,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     """Measure every method on every scene. Run times are compared, so no two runs take place at once."""
     left_out: list[dict[str, Any]] = pinning_omissions(config, "methods")
     if config.contact is not None and not is_passive_compass(config):
-        left_out.append(dict(OMISSION_OFF_COMPASS))
+        left_out.append(OMISSION_OFF_COMPASS)
     references: dict[str, Reference] = {}
     ascents: list[Ascent] = []
     trials = [*trials_of_scene(config, inputs)]

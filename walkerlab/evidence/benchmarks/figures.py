@@ -87,13 +87,10 @@ def draw_methods(scene: str, results: Results) -> Drawn:
     reference = summary["reference"][scene]
     # The difference between the two references is their uncertainty, so errors below it mean nothing.
     floor = max(float(reference["agreement"]), MIN_FLOOR)
-    errors = [
-        float(np.max(series.runs["error"], where=series.runs["reached"] != 0, initial=floor)) for series in all_series
-    ]
+    errors = [float(np.max(each.runs["error"], where=each.runs["reached"] != 0, initial=floor)) for each in all_series]
     failed = FAILURE_LEVEL * max(errors)
     figure, (left, right) = panels(3.9, 1, 2, sharey=True)
-    costs_of = ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides"))
-    for axes, name, label in costs_of:
+    for axes, name, label in ((left, "wall_s", "run time (s)"), (right, "rhs_evaluations", "right-hand sides")):
         axes.set_xlabel(label)
         axes.axhspan(MIN_FLOOR, floor, color=PALE, zorder=0)
         for series in all_series:
@@ -167,8 +164,7 @@ def draw_errors(scene: str, results: Results) -> Drawn:
         cost_axis(axes)
         error_axis(axes)
         axes.set(xlabel="run time (s)", ylabel=label, title=title)
-        legend = [series.key for series in all_series if np.isfinite(series.runs["error"]).any()]
-        if legend:
+        if legend := [series.key for series in all_series if np.isfinite(series.runs["error"]).any()]:
             add_legend(figure, legend, title, edge)
     summary = results[ENGINES_STAGE].summary
     return figure, (summary["reference"][scene], summary["conclusions"][scene][SAME_LAW])

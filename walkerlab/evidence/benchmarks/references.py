@@ -3,8 +3,8 @@
 For a rigid compass, one of the two is the Taylor method of heyoka.
 """
 
-import importlib.util
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,6 @@ TAYLOR_METHOD = "heyoka-taylor"
 STOPPED_BY_EVENT = -1  # code of heyoka for a stop at the first terminal event. Failures and time limits have others
 
 
-def has_heyoka() -> bool:
-    return importlib.util.find_spec("heyoka") is not None
-
-
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
     """Simulate a walk with heyoka. Return the state after `steps` heel strikes, or None if one does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
@@ -36,8 +32,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
             integrator.time, integrator.state[:] = 0.0, state
             # heyoka ignores an event for a while after it has occurred, even if we replace time and state.
             integrator.reset_cooldowns()
-            outcome = integrator.propagate_until(limit)[0]
-            if outcome.value != STOPPED_BY_EVENT:
+            if integrator.propagate_until(limit)[0].value != STOPPED_BY_EVENT:
                 return None
             state = np.array(integrator.state)
         state = np.array(impact(walker, *state.tolist()))
@@ -49,15 +44,13 @@ def taylor_integrators(walker: RigidWalker) -> tuple[Any, Any]:
     import heyoka as hy
 
     th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")
-    L, a, m, M = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
+    L, a, m, M, inertia, g, slope, c21_sign = walker
     b = L - a
-    g = walker.gravity
-    inertia = walker.leg_inertia
     d11 = m * b * b + inertia
     d22 = M * L * L + m * (L * L + a * a) + inertia
     d12 = -m * L * b * hy.cos(th2 - th1)
     r1 = -m * L * b * w2 * w2 * hy.sin(th2 - th1) - m * g * b * hy.sin(th1)
-    r2 = -walker.c21_sign * m * L * b * w1 * w1 * hy.sin(th2 - th1) + (M * L + m * (a + L)) * g * hy.sin(th2)
+    r2 = -c21_sign * m * L * b * w1 * w1 * hy.sin(th2 - th1) + (M * L + m * (a + L)) * g * hy.sin(th2)
     determinant = d11 * d22 - d12 * d12
     equations = [
         (th1, w1),
@@ -65,10 +58,8 @@ def taylor_integrators(walker: RigidWalker) -> tuple[Any, Any]:
         (w1, (d22 * r1 - d12 * r2) / determinant),
         (w2, (d11 * r2 - d12 * r1) / determinant),
     ]
-    upward = hy.event_direction.positive
-    downward = hy.event_direction.negative
-    passing = hy.t_event(th1 - th2, direction=upward)
-    striking = hy.t_event(th1 + th2 + 2.0 * walker.slope, direction=downward)
+    passing = hy.t_event(th1 - th2, direction=hy.event_direction.positive)
+    striking = hy.t_event(th1 + th2 + 2.0 * slope, direction=hy.event_direction.negative)
     return tuple(hy.taylor_adaptive(equations, [0.0] * 4, t_events=[event]) for event in (passing, striking))
 
 
@@ -152,7 +143,7 @@ def second_end(trial: Trial) -> End:
 
 def compass_of(trial: Trial) -> RigidWalker | None:
     """Return the Appendix A walker of a rigid trial, or None if the trial has no compass or heyoka is not installed."""
-    return trial.compass if isinstance(trial, RigidTrial) and has_heyoka() else None
+    return trial.compass if isinstance(trial, RigidTrial) and find_spec("heyoka") else None
 
 
 def tightest_end(trial: Trial, method: str) -> End:

@@ -51,10 +51,8 @@ def walk_as_a_script(
     """
     from scipy.integrate import solve_ivp
 
-    L, a, m, M = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
+    L, a, m, M, J, g, slope, c21_sign = walker
     b = L - a
-    g = walker.gravity
-    slope = walker.slope
     used = 0
 
     def right_hand_side(_t: float, x: Floats) -> Floats:
@@ -63,11 +61,10 @@ def walk_as_a_script(
         if used > budget:
             raise ScriptBudgetError
         th1, th2, w1, w2 = x
-        sine = np.sin(th2 - th1)
-        cosine = np.cos(th2 - th1)
+        sine, cosine = np.sin(th2 - th1), np.cos(th2 - th1)
         D = np.array([[m * b**2, -m * L * b * cosine], [-m * L * b * cosine, M * L**2 + m * (L**2 + a**2)]])
-        D += walker.leg_inertia * np.eye(2)
-        C = np.array([[0.0, m * L * b * w2 * sine], [walker.c21_sign * m * L * b * w1 * sine, 0.0]])
+        D += J * np.eye(2)
+        C = np.array([[0.0, m * L * b * w2 * sine], [c21_sign * m * L * b * w1 * sine, 0.0]])
         G = np.array([m * g * b * np.sin(th1), -(M * L + m * (a + L)) * g * np.sin(th2)])
         return np.concatenate([x[2:], np.linalg.solve(D, -C @ x[2:] - G)])
 

@@ -98,9 +98,8 @@ class Checked:
     @property
     def convention(self) -> Convention:
         """Convention of the printed state or, if none is printed, the one that the block `check` states."""
-        for convention in self.conventions.values():
-            return convention
-        return stated(self.check, 2 * len(self.check.angles.order or (0, 0)), 3)
+        printed = next(iter(self.conventions.values()), None)
+        return printed or stated(self.check, 2 * len(self.check.angles.order or (0, 0)), 3)
 
     def printed_state(self, name: str, known: Floats) -> tuple[Floats, Floats] | None:
         """Return a printed state of all bodies, and its change if each number changes by a unit of its last digit.
@@ -112,9 +111,8 @@ class Checked:
         items = self.numbers(name)
         numbers = np.array([item.value for item in items])
         moves = np.diag([item.last_digit for item in items])
-        state, *moved = (
-            self.conventions[name].read(self.walker, each, known) for each in (numbers, *(numbers + moves))
-        )
+        convention = self.conventions[name]
+        state, *moved = (convention.read(self.walker, each, known) for each in (numbers, *(numbers + moves)))
         return state, np.abs(np.subtract(moved, state)).sum(axis=0)
 
     @cached_property
@@ -127,8 +125,7 @@ class Checked:
             rates = gait.state[len(names) // 2 :]
             extra = (rates[2],) if self.walker.kneed and self.walker.free_at_strike else ()
             start = np.array([*(angle + self.walker.slope for angle in gait.state[:2]), *rates[:2], *extra])
-            step = plain.take_step(self.walker, start)
-            if step is not None:
+            if (step := plain.take_step(self.walker, start)) is not None:
                 found[CheckedStep(self.walker, start, step)] = printable_values(gait_summary(gait))
         return found
 
@@ -212,14 +209,13 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
     if not checked.gaits:
         return answer_without(check, f"the walker has no gait here ({checked.search.reason})")
     right = checked.right
-    question = checked.question
     values = checked.values(right)
     rows = [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in items]
     searched = any(row["digits"] < row["of_digits"] and row["right"] is not None for row in rows)
-    explanations, closest = explain(question) if searched else ([], None)
+    explanations, closest = explain(checked.question) if searched else ([], None)
     periodic = periodicity(checked, right)
     if periodic and searched and not periodic["is_periodic"]:
-        periodic["periodic_with"] = find_periodic_changes(question)
+        periodic["periodic_with"] = find_periodic_changes(checked.question)
     return {
         "source": check.source.model_dump(),
         "finding": summarise_verdicts(rows, explanations),
@@ -240,12 +236,11 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
 def answer_without(check: Check, reason: str) -> dict[str, Any]:
     """Return the answer for a gait that cannot be compared, for the given reason."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
-    rows = [judge(item, None, reason).row for item in items]
     head = {
         "source": check.source.model_dump(),
         "finding": Verdict.NOT_COMPARABLE.value,
         "reason": reason,
-        "values": rows,
+        "values": [judge(item, None, reason).row for item in items],
     }
     lists: dict[str, Any] = {"momenta": [], "explanations": [], "undecided": "", "searched": False}
     return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}

@@ -1,7 +1,5 @@
 """`walkerlab check`: check printed gaits of configs, or a state typed on the command line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ misprinted parameter. A step from the printed state gives a first guess of its g
 candidates, and only a gait that reproduces the printed digits is an explanation.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 import re
@@ -62,8 +60,7 @@ def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
     values = parameters(config)
     for key, value in values.items():
         for other, how in list_misprints(key, value, values):
-            walker = walker_with(config, key, other)
-            if walker is not None:
+            if (walker := walker_with(config, key, other)) is not None:
                 yield Candidate("misprint", f"{key} is {short_number(other)} ({how})", walker)
 
 
@@ -175,9 +172,9 @@ class Question:
         enough = len(reproduced) >= min(MIN_REPRODUCED, len(self.items))
         return self.explanation(candidate.kind, candidate.what, reproduced) if enough else None
 
-    def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
+    def miss(self, walk: CheckedStep, items: Sequence[Item]) -> float:
         """Return the largest difference between a walk and a printed value, in units of the value's last digit."""
-        values = walk.values(items, convention or self.convention)
+        values = walk.values(items, self.convention)
         return max((item.miss(values[item.name]) for item in items), default=math.inf)
 
     def misses(self, walker: PlainWalker | None) -> Floats | None:
@@ -199,9 +196,8 @@ class Question:
         The step begins at the printed state or, if no state is printed, at the start of the right gait. Returns None if
         it leads nowhere.
         """
-        start = (
-            self.right.start if self.state is None else plain.start_from(walker, self.state, self.convention.instant)
-        )
+        instant = self.convention.instant
+        start = self.right.start if self.state is None else plain.start_from(walker, self.state, instant)
         step = None if start is None else plain.take_step(walker, start, tolerance)
         if step is None or start is None or self.right.derivative is None:
             return None
@@ -209,7 +205,7 @@ class Question:
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
         # Printed values such as the period need the step from the new start. A state just after a strike does not.
-        quantities = {self.convention.instant, *(item.quantity for item in self.quick_items)}
+        quantities = {instant, *(item.quantity for item in self.quick_items)}
         after = step if quantities == {"after-strike", "state"} else plain.take_step(walker, start + move, tolerance)
         return None if after is None else CheckedStep(walker, start + move, after)
 
@@ -449,8 +445,7 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
     found: list[dict[str, float | str]] = []
     for key, value in parameters(question.config).items():
-        walker_of = partial(walker_with, question.config, key)
-        change = fit(states, walker_of, value, value * (1.0 + 1e-4))
+        change = fit(states, partial(walker_with, question.config, key), value, value * (1.0 + 1e-4))
         if change is not None and change.change < CONVERGED and change.left <= 1.0:
             found.append({"key": key, "value": float(f"{change.value:.6g}")})
     return found

@@ -1,7 +1,5 @@
 """The check of printed gaits as an extension: its stage, command and section."""
 
-from __future__ import annotations
-
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension
 from walkerlab.pipeline.plan.stage import Stage

@@ -199,16 +199,11 @@ def alternatives(convention: Convention) -> list[Convention]:
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
     """Return the derivative of the step map at a start by central differences, or None if a step fails."""
     columns = []
-    moves = DIFFERENCE * plain.scales(walker, len(start))
-    for k, move in enumerate(moves):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = start.copy()
-            moved[k] += sign * move
-            ends.append(plain.take_step(walker, moved, tolerance))
-        if ends[0] is None or ends[1] is None:
+    for move in np.diag(DIFFERENCE * plain.scales(walker, len(start))):
+        first, second = (plain.take_step(walker, moved, tolerance) for moved in (start + move, start - move))
+        if first is None or second is None:
             return None
-        columns.append((ends[0].after - ends[1].after) / (2.0 * move))
+        columns.append((first.after - second.after) / (2.0 * move.sum()))
     return np.array(columns).T
 
 

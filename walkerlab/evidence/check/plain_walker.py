@@ -9,8 +9,6 @@ State of a walker: angles, then rates, of the swing leg (its thigh), the stance 
 swing shank. A torso on the legs' bisector follows them.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -359,8 +357,7 @@ def take_step(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> P
         return None
     before = pieces[-1].end
     length = walker.swing_foot(before).real - walker.radius * (before[STANCE] - start[STANCE])
-    period = sum(piece.duration for piece in pieces)
-    return PlainStep(period, length, before, after_strike(walker, before), pieces)
+    return PlainStep(sum(piece.duration for piece in pieces), length, before, after_strike(walker, before), pieces)
 
 
 def land(walker: PlainWalker, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
@@ -493,8 +490,7 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
     lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
     free = walker.knee.at_heel_strike == "free"
     damping = walker.knee.damping_N_m_s_per_rad
-    knee = -1j * thigh.length_m
-    return replace(plain, parts=(upper, lower), knee=knee, free_at_strike=free, knee_damping=damping)
+    return replace(plain, parts=(upper, lower), knee=-1j * thigh.length_m, free_at_strike=free, knee_damping=damping)
 
 
 class Mistake(NamedTuple):
@@ -528,8 +524,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
         for (rate, weights), (mark, sign) in product(rates.items(), (("−", 1.0), ("+", -1.0))):
             what = f"{momentum} has an extra term {mark}I × {rate}, where I is the leg's inertia"
             yield mistake(what, extra_inertia=tuple(sign * weight for weight in weights))
-        massless = tuple(part._replace(inertia=0.0) for part in right.parts)
-        yield mistake("the legs' inertia is left out", parts=massless)
+        yield mistake("the legs' inertia is left out", parts=tuple(part._replace(inertia=0.0) for part in right.parts))
         yield mistake("the legs' inertia is left out of the heel strike", strike_inertia=0.0)
     yield mistake("the trailing leg keeps its rate through the heel strike", keeps_trailing_rate=True)
     if right.radius:

@@ -1,7 +1,5 @@
 """Comparison of printed numbers with the right ones: how many digits agree, and the verdict."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

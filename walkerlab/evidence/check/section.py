@@ -1,7 +1,5 @@
 """Answer and report section of a check."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -36,12 +34,8 @@ def is_partly_reproduced(row: Row) -> bool:
 def agreeing_digits(row: Row) -> str:
     if row["printed"].startswith(("<", ">")):
         return ""
-    agreeing = f"{row['digits']} of {row['of_digits']}"
-    return (
-        f"{agreeing}, off by {format_units(row['difference_in_units'])} units"
-        if is_partly_reproduced(row)
-        else agreeing
-    )
+    off = f", off by {format_units(row['difference_in_units'])} units" if is_partly_reproduced(row) else ""
+    return f"{row['digits']} of {row['of_digits']}{off}"
 
 
 def verdict_of(row: Row) -> str:
@@ -57,8 +51,7 @@ def answer(summary: Row) -> list[str | Table]:
 def section(_results: Any, summary: Row) -> Section | None:
     """Build the section of the page."""
     evidence = Column("evidence", "evidence", wide=True)
-    caption = "Printed and right values"
-    rows = table(caption, (*COLUMNS, evidence), summary["values"], note=source_of(summary["source"]))
+    rows = table("Printed and right values", (*COLUMNS, evidence), summary["values"], note=source_of(summary["source"]))
     blocks: tuple[PageBlock, ...] = (rows, *(Paragraph(text) for text in remarks(summary)))
     return Section.create("check", "The printed gait", blocks, headline(summary))
 
@@ -157,8 +150,7 @@ def state_remarks(summary: Row) -> Iterator[str]:
     elif periodic and periodic["residual"] is None:
         yield "From the printed state, the walker does not complete a step."
     elif periodic:
-        nearer = periodic["distance_after_a_step"] < periodic["distance_from_gait"]
-        moves = "nearer to" if nearer else "farther from"
+        moves = "nearer to" if periodic["distance_after_a_step"] < periodic["distance_from_gait"] else "farther from"
         units = periodic["in_units_of_last_digit"]
         last = f", {number(units, 2)} units of its last digit" if units < MANY_UNITS else ""
         yield (
@@ -168,8 +160,7 @@ def state_remarks(summary: Row) -> Iterator[str]:
         changes = [f"{each['key']} = {number(each['value'], 6)}" for each in periodic.get("periodic_with", ())]
         if changes:
             yield f"It would be periodic with {' or '.join(changes)}."
-    broken = [each for each in summary["momenta"] if not each["conserved"]]
-    if broken:
+    if broken := [each for each in summary["momenta"] if not each["conserved"]]:
         changes = [f"that of {each['about']} by {number(each['residual'], 3)} {each['unit']}" for each in broken]
         kept = [each["about"] for each in summary["momenta"] if each["conserved"]]
         fine = f" That of {join_words(kept)} is conserved." if kept else ""

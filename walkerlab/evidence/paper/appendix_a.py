@@ -10,6 +10,9 @@ positive, rad and rad/s. The walker walks in +x, downhill for a positive slope.
 import math
 from typing import NamedTuple
 
+from walkerlab.config.reads import RigidConfig
+from walkerlab.config.schema import Equations
+from walkerlab.config.walkers import CompassWalker, is_passive_compass
 from walkerlab.evidence.paper.law import as_printed
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import RigidModel
@@ -46,11 +49,7 @@ class Swing(NamedTuple):
 
 
 def swing_constants(walker: RigidWalker) -> Swing:
-    L = walker.leg_length
-    a = walker.foot_to_mass
-    m = walker.leg_mass
-    M_H = walker.hip_mass
-    J = walker.leg_inertia
+    L, a, m, M_H, J = walker[:5]
     b = L - a
     return Swing(
         m * b * b + J, M_H * L * L + m * (L * L + a * a) + J, m * L * b, m * b, (L + a) * m + L * M_H, M_H + 2.0 * m
@@ -115,3 +114,27 @@ def assembled(walker: RigidWalker) -> RigidModel:
     leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)
     model = rigid_on_slope(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)
     return as_printed(model) if walker.c21_sign == AS_PRINTED else model
+
+
+def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
+    """Return a config's passive compass as a walker of Appendix A.
+
+    Raises ValueError for another walker.
+    """
+    walker = config.walker
+    if not isinstance(walker, CompassWalker) or walker.torso is not None:
+        raise ValueError(f"Appendix A does not describe walkers of type {walker.type}")
+    return RigidWalker(
+        leg_length=walker.leg_length_m,
+        foot_to_mass=walker.foot_to_mass_m,
+        leg_mass=walker.leg_mass_kg,
+        hip_mass=walker.hip_mass_kg,
+        leg_inertia=walker.leg_inertia_kg_m2,
+        gravity=config.gravity_m_s2,
+        slope=config.slope_rad,
+        c21_sign=AS_PRINTED if equations == "as-printed" else CORRECTED,
+    )
+
+
+def compass_or_none(config: RigidConfig, equations: Equations) -> RigidWalker | None:
+    return compass(config, equations) if is_passive_compass(config) else None

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.reads import CompareConfig, ContactConfig
+from walkerlab.evidence.paper.appendix_a import compass
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import (
     EQUATION_SETS,
@@ -25,7 +26,6 @@ from walkerlab.evidence.paper.measured import (
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
 from walkerlab.evidence.paper.rows import VERDICTS, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.evidence.paper.study import Erratum, errata, study_the_paper
-from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
 from walkerlab.physics.ground.walker import changed_forms
 from walkerlab.physics.hybrid import comparison
@@ -165,8 +165,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
     """Compare the recorded walk with both models. Return groups and summary, which are empty without a recording."""
-    recorded = inputs.get("recorded-walk")
-    if recorded is None:
+    if (recorded := inputs.get("recorded-walk")) is None:
         return {}, {}
     motion = motion_of(recorded)
     compared: dict[str, Comparison] = {
@@ -196,8 +195,7 @@ def characteristics_of(walk: Content) -> Characteristics:
 
 def stored_energy(walk: Content) -> EnergyRecord | None:
     """Return the energy of a stored walk over its last steps, or None if energies were not stored."""
-    joules = stored_variable(walk, "trajectory", "mechanical_J")
-    if joules is None:
+    if (joules := stored_variable(walk, "trajectory", "mechanical_J")) is None:
         return None
     return mean_over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))
 
@@ -382,9 +380,8 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
     """Measure the values of the contact model that correspond to the ADAMS numbers of the paper."""
-    summary = walk.summary
     pitch = float(walk.summary["pitch_m"])
-    lengths = np.array(summary["step_lengths_m"])
+    lengths = np.array(walk.summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
     angle = stored_variable(walk, "trajectory", "angle")
     # Start from the printed x_p, but with the swing angle that puts both feet on the slope of the config.
@@ -395,7 +392,7 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
     return ContactMeasurements(
         law=require_contact(config),
         foot_radius=config.walker.foot_radius_m,
-        summary=summary,
+        summary=walk.summary,
         # Leg 0 swings first, as in the rigid model's state.
         start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
         table_3=characteristics_of(walk),
@@ -439,8 +436,7 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
         meaning = COLUMN_NAMES[name]
         if name in MODEL_NAMES:
             variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
-            rows_with_value = [row for row, value in enumerate(values) if value is not None]
-            if rows_with_value:
+            if rows_with_value := [row for row, value in enumerate(values) if value is not None]:
                 dim = f"{name}_{ROW}"
                 text = f"indices of the rows that have a value: {meaning}"
                 variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", text)

@@ -13,10 +13,9 @@ from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 
 def is_own_walker(config: Any) -> bool:
     """Whether a config has the walker of the paper, up to rounding of values."""
-    walker = config.walker
     paper = CompassWalker()
     return is_passive_compass(config) and all(
-        are_equal(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
+        are_equal(getattr(config.walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
     )
 
 

@@ -53,8 +53,7 @@ def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -
     """Compute the quantities of Table 3 from step periods (s), step lengths (m) and the mean energy (J) of a walk."""
     strides = len(periods) // 2
     if strides == 0:
-        first = float(periods[0]) if len(periods) else None
-        return Characteristics(first, None, None, None, mean_energy)
+        return Characteristics(float(periods[0]) if len(periods) else None, None, None, None, mean_energy)
     left, right = 2 * strides - 2, 2 * strides - 1
     cycle = float(periods[left] + periods[right])
     speed = float(lengths[left] + lengths[right]) / cycle
@@ -182,11 +181,10 @@ class Measured:
     def speed_differences(self) -> dict[str, float]:
         """Difference (%) of the average velocities of contact and rigid model, by set of equations."""
         contact = self.contact.table_3.v_com
-        speeds = {name: model.table_3.v_com for name, model in self.models.items()}
         return {
             name: 100.0 * abs(contact - rigid) / abs(rigid)
-            for name, rigid in speeds.items()
-            if rigid and contact is not None
+            for name, model in self.models.items()
+            if (rigid := model.table_3.v_com) and contact is not None
         }
 
 
@@ -215,10 +213,8 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
         rigid.append(describe("walker.type", walker.type, paper.type))
     else:
         compass = [name for name in CompassWalker.model_fields if name not in (*CONTACT_MODEL_KEYS, "hip")]
-        rigid += [
-            *describe_differences(walker, paper, compass),
-            *describe_differences(config, Config(), ["gravity_m_s2"]),
-        ]
+        rigid += describe_differences(walker, paper, compass)
+        rigid += describe_differences(config, Config(), ["gravity_m_s2"])
         slope, rounding = slope_of(*X_P[:2])
         if abs(config.slope_rad - slope) > rounding:
             rigid.append(describe("slope_rad", config.slope_rad, slope))

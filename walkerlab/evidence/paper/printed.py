@@ -168,8 +168,7 @@ def speed_as_printed(cycle: float) -> float:
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     """Return the relative difference (%) of the speeds that section 5 would compute from two cycle times (s)."""
     matlab = speed_as_printed(matlab_cycle)
-    adams = speed_as_printed(adams_cycle)
-    return 100.0 * abs(adams - matlab) / matlab
+    return 100.0 * abs(speed_as_printed(adams_cycle) - matlab) / matlab
 
 
 def softening_in_metres() -> float:
@@ -225,10 +224,9 @@ def percentages() -> Iterator[tuple[Printed, str]]:
         # The signs of the column follow no rule, so only magnitudes are compared.
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
         if are_disjoint((smallest, max(abs(low), abs(high))), row.percent.rounding):
-            change = (
-                f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is a change of {row.percent_of_matlab:+.3g}%"
-            )
-            yield row.percent, f"{change} of the MATLAB value ({low:+.2f} to {high:+.2f}%, given the rounding)"
+            change = f"a change of {row.percent_of_matlab:+.3g}% of the MATLAB value"
+            open_to = f"({low:+.2f} to {high:+.2f}%, given the rounding)"
+            yield row.percent, f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is {change} {open_to}"
 
 
 def percent_left_open(row: StartRow) -> Interval:
@@ -261,18 +259,13 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
         steps = interval(lambda swing, stance: 2.0 * leg.value * sin(0.5 * (stance - swing)), *angles)
         feet = f"the feet are 2 L sin((theta_2 - theta_1)/2) = {length:.4f} m apart ({source})"
         if column == "matlab" and are_disjoint(steps, STEP_LENGTH.rounding):
-            yield (
-                STEP_LENGTH,
-                f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m",
-            )
+            yield STEP_LENGTH, f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m"
         speed = getattr(V_COM, column)
         cycle = getattr(T_CYCLE, column)
         # The speed may be that of one step per cycle, as in section 5, or of both steps of the cycle.
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
         if are_disjoint((low, high), speed.rounding):
-            one_step = length / cycle.value
-            two_steps = 2.0 * length / cycle.value
-            speeds = f"one step is {one_step:.3f} m/s and two are {two_steps:.3f} m/s"
+            speeds = f"one step is {length / cycle.value:.3f} m/s and two are {2.0 * length / cycle.value:.3f} m/s"
             yield speed, f"{feet}: in {cycle.text} s {speeds}, not {speed.text} m/s"
 
 

@@ -45,13 +45,12 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
     """Yield the rows of all numbers, in the order of the paper."""
     judge = Judge(measured, study)
     contact = measured.contact
-    walker = measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
-        yield judge.judge_input(entry, float(getattr(walker, parameter)), "rigid")
+        yield judge.judge_input(entry, float(getattr(measured.walker, parameter)), "rigid")
     for coordinate, entry in enumerate(printed.X_P):
         yield judge.fixed_point(entry, coordinate)
     yield judge.eigenvalue()
-    yield judge.judge_input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.judge_input(printed.LEG_INERTIA, measured.walker.leg_inertia, "rigid")
     yield judge.judge_input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
         yield judge.judge_input(entry, value, "contact", prose("evidence.unitless", contact))
@@ -114,15 +113,13 @@ class Judge:
 
     def fixed_point(self, entry: Printed, coordinate: int) -> Judged:
         values = {name: model.state[coordinate] for name, model in self.measured.models.items()}
-        agreements = {name: entry.agreement(value) for name, value in values.items()}
-        text = prose("evidence.fixed_point", values, agreements)
+        text = prose("evidence.fixed_point", values, {name: entry.agreement(value) for name, value in values.items()})
         return self.row(entry, values, None, verdict_on(entry, values.values()), "rigid", text)
 
     def eigenvalue(self) -> Judged:
-        entry = printed.EIGENVALUES
         radii = self.measured.spectral_radii
-        verdict = verdict_on(entry, [max(radii.values(), default=None)])
-        return self.row(entry, radii, None, verdict, "rigid", prose("evidence.eigenvalue", radii))
+        verdict = verdict_on(printed.EIGENVALUES, [max(radii.values(), default=None)])
+        return self.row(printed.EIGENVALUES, radii, None, verdict, "rigid", prose("evidence.eigenvalue", radii))
 
     def lost_balance(self) -> Judged:
         """Judge the paper's claim that the walker loses its balance from MATLAB's initial conditions."""
@@ -160,13 +157,11 @@ class Judge:
 
     def error(self) -> Judged:
         """Judge the largest error of Fig. 8, for angles and angular velocities together."""
-        entry = printed.LARGEST_ERROR
-        study = self.study
         differences = self.measured.errors
         late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
         quantities: tuple[tuple[Quantity, float, str], ...] = (
-            ("angle", study.fastest * late, "rad"),
-            ("velocity", study.largest_jump, "rad/s"),
+            ("angle", self.study.fastest * late, "rad"),
+            ("velocity", self.study.largest_jump, "rad/s"),
         )
         errors_by_quantity = [
             (f"{off:.2g} {unit}", unit, {way: difference.largest(quantity) for way, difference in differences.items()})
@@ -175,7 +170,7 @@ class Judge:
         text = prose("evidence.error", late, self.measured.equations, errors_by_quantity)
         way = "aligned" if "aligned" in differences else "raw"
         largest = max((max(errors[way]) for _, _, errors in errors_by_quantity if way in errors), default=None)
-        return self.row(entry, {}, largest, Verdict.NOT_REPRODUCED, "any", text)
+        return self.row(printed.LARGEST_ERROR, {}, largest, Verdict.NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> Judged:
         entry = printed.STEP_LENGTH
@@ -187,16 +182,14 @@ class Judge:
 
     def velocity_difference(self) -> Judged:
         """Judge the difference of the average velocities. The evidence repeats the arithmetic of the paper."""
-        entry = printed.VELOCITY_DIFFERENCE
         percentages = self.measured.speed_differences
-        left = printed.T_LEFT
-        right = printed.T_RIGHT
-        cycle = printed.T_CYCLE
-        by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
-        sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
+        rows = printed.T_LEFT, printed.T_RIGHT, printed.T_CYCLE
+        left, right, cycle = ((row.matlab.value, row.adams.value) for row in rows)
+        by_cycle = speed_difference(*cycle)
+        sums = speed_difference(left[0] + right[0], left[1] + right[1])
         text = prose("evidence.velocity_difference", percentages, by_cycle, sums)
-        verdict = verdict_on(entry, [max(percentages.values(), default=None)])
-        return self.row(entry, percentages, None, verdict, "contact", text)
+        verdict = verdict_on(printed.VELOCITY_DIFFERENCE, [max(percentages.values(), default=None)])
+        return self.row(printed.VELOCITY_DIFFERENCE, percentages, None, verdict, "contact", text)
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[Judged]:
         """Judge a row of Table 3: the MATLAB value by the rigid model, the ADAMS value by the contact model."""
@@ -245,10 +238,8 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
         ("r", "radius of the foot", "m", radius.value / MM_PER_M, measured.contact.foot_radius, radius.where),
         ("phi", "slope", "rad", study.slope, walker.slope, "not stated: from the angles of x_p"),
     )
-    return {
-        symbol: {"quantity": quantity, "unit": unit, "paper": paper, "used": used, "where": where}
-        for symbol, quantity, unit, paper, used, where in rows
-    }
+    columns = ("quantity", "unit", "paper", "used", "where")
+    return {symbol: dict(zip(columns, values, strict=True)) for symbol, *values in rows}
 
 
 def table_2(measured: Measured) -> Table:

@@ -25,8 +25,7 @@ def numbers(results: page.Results) -> page.Section | None:
     rows = compared(results, "paper_numbers")
     if not rows:
         return None
-    meanings = words.terms("paper.verdicts").items()
-    statements = tuple(verdict_statement(name, meaning) for name, meaning in meanings)
+    statements = tuple(verdict_statement(name, meaning) for name, meaning in words.terms("paper.verdicts").items())
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (page.Paragraph(departs, "fair"), page.Statements(statements, "lines"), numbers_table(rows))
     return page.Section.create("paper-numbers", "The paper’s numbers", blocks, finding(rows), page.PAPER_PAGE)
@@ -89,8 +88,7 @@ def table_of(key: str, rows: Any) -> Table:
 
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     """Build a table of the paper with the digits as printed. Columns without values are omitted."""
-    has_quantities = any("quantity" in row for row in rows.values())
-    columns = [Column("symbol" if has_quantities else "quantity", "row")]
+    columns = [Column("symbol" if any("quantity" in row for row in rows.values()) else "quantity", "row")]
     heads = words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
         if key == "unit" or key.endswith(TEXT_SUFFIX):
@@ -136,10 +134,9 @@ def list_verdicts(results: page.Results, rows: Sequence[Row]) -> Iterator[page.P
     texts = {name: words("verdict.places", counts, totals) for name, counts in places.items() if counts}
     statements = (verdict_statement(name, text) for name, text in texts.items())
     yield page.Statements(tuple(statements), "lines")
-    headlines = words.terms("verdict.headlines").items()
     gravest = [
         (headline, erratum)
-        for place, headline in headlines
+        for place, headline in words.terms("verdict.headlines").items()
         for erratum in compared(results, "errata")
         if erratum["where"].startswith(place)
     ]
@@ -162,12 +159,10 @@ RECORDED_COLUMNS = (
 
 def recorded(results: page.Results) -> page.Section | None:
     """Compare the recorded walk with both models, or return None if no walk was recorded."""
-    stored = results.summary("compare").get("recorded")
-    if stored is None:
+    if (stored := results.summary("compare").get("recorded")) is None:
         return None
-    return page.Section(
-        "recorded", f"The recorded walk {stored['name']}", tuple(recorded_tables(stored)), describe_recorded(stored)
-    )
+    title = f"The recorded walk {stored['name']}"
+    return page.Section("recorded", title, tuple(recorded_tables(stored)), describe_recorded(stored))
 
 
 def describe_recorded(stored: Row) -> str:
@@ -188,14 +183,13 @@ def recorded_tables(stored: Row) -> Iterator[Table]:
     ]
     yield table(f"Quantities of Table 3 with {stored['name']}", columns, rows)
     keys = {"max_angle_error_rad": ("angle", "rad"), "max_velocity_error_rad_s": ("angular velocity", "rad/s")}
-    ways = {"raw": "at the same time", "aligned": "at the same phase"}
     differences = [
         {
             "quantity": name_with_unit(f"{name} {words_of_way}", unit),
             **{model: each[key][way] for model, each in stored["differences"].items()},
         }
         for key, (name, unit) in keys.items()
-        for way, words_of_way in ways.items()
+        for way, words_of_way in {"raw": "at the same time", "aligned": "at the same phase"}.items()
     ]
     yield table(f"Differences of {stored['name']} from both models", RECORDED_COLUMNS, differences)
 

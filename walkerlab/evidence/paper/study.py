@@ -29,18 +29,15 @@ def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Ar
     """Return the mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
     c = swing_constants(walker)
     coupling = -c.mLb * math.cos(theta_2 - theta_1)
-    s1 = math.sin(theta_1)
-    c1 = math.cos(theta_1)
-    s2 = math.sin(theta_2)
-    c2 = math.cos(theta_2)
-    return np.array(
-        [
-            [c.d11, coupling, c.mb * c1, c.mb * s1],
-            [coupling, c.d22, -c2 * c.K, -s2 * c.K],
-            [c.mb * c1, -c2 * c.K, c.mass, 0.0],
-            [c.mb * s1, -s2 * c.K, 0.0, c.mass],
-        ]
-    )
+    s1, c1 = math.sin(theta_1), math.cos(theta_1)
+    s2, c2 = math.sin(theta_2), math.cos(theta_2)
+    rows = [
+        [c.d11, coupling, c.mb * c1, c.mb * s1],
+        [coupling, c.d22, -c2 * c.K, -s2 * c.K],
+        [c.mb * c1, -c2 * c.K, c.mass, 0.0],
+        [c.mb * s1, -s2 * c.K, 0.0, c.mass],
+    ]
+    return np.array(rows)
 
 
 def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
@@ -62,12 +59,9 @@ def height_over_slope(walker: RigidWalker, theta_1: float, theta_2: float, row_2
 def swing_foot_gradient(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
     """Return the matrix E of (A.56), the derivative of `swing_foot` with respect to (theta_1, theta_2, x, y)."""
     L = walker.leg_length
-    return np.array(
-        [
-            [L * math.cos(theta_1), -L * math.cos(theta_2), 1.0, 0.0],
-            [row_2 * L * math.sin(theta_1), -row_2 * L * math.sin(theta_2), 0.0, 1.0],
-        ]
-    )
+    along = [L * math.cos(theta_1), -L * math.cos(theta_2), 1.0, 0.0]
+    up = [row_2 * L * math.sin(theta_1), -row_2 * L * math.sin(theta_2), 0.0, 1.0]
+    return np.array([along, up])
 
 
 def velocities_after_impact(walker: RigidWalker, before: State, row_2: float) -> Array:
@@ -144,10 +138,8 @@ def study_the_paper() -> PaperStudy:
     right = printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
     as_printed = settle(wrong)
-    corrected = settle(right)
     one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
     cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.PAPER_CYCLES, sampled=True)
-    five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)
     assert one_step.samples is not None
     slope, rounding = printed.slope_of(*printed.X_P[:2])
     adams_slope, _ = printed.slope_of(printed.TABLE_2[0].adams, printed.TABLE_2[1].adams)
@@ -155,9 +147,9 @@ def study_the_paper() -> PaperStudy:
         slope=slope,
         slope_rounding=rounding,
         as_printed=measured.measure_rigid_model(wrong, as_printed),
-        corrected=measured.measure_rigid_model(right, corrected),
+        corrected=measured.measure_rigid_model(right, settle(right)),
         from_x_p=measured.characteristics(cycles.periods_s, cycles.lengths_m, cycles.mean_energy),
-        five_steps_energy=five_steps.mean_energy,
+        five_steps_energy=take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS).mean_energy,
         fastest=float(np.abs(one_step.samples.state[:, 2:]).max()),
         largest_jump=float(np.abs(one_step.after[0, [3, 2]] - one_step.before[0, 2:]).max()),
         swing_foot_height=height_over_slope(wrong, *x_p[:2], MISPRINTED),

@@ -67,14 +67,6 @@ from walkerlab.pipeline.store.content import (
     values_by_column,
 )
 from walkerlab.scene import contact
-from walkerlab.scene.contact import (
-    SAMPLES_PER_PENDULUM_TIME,
-    build_scaled_starts,
-    contact_drives,
-    knee_rules,
-    scale_for_map,
-    start_state,
-)
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
@@ -133,35 +125,29 @@ def limit_findings(tune: "TuneRun", rigid_gait: Mapping[str, Any], progress: Pro
         return None
     compass = isinstance(config.walker, CompassWalker) and config.walker.torso is None
     legs = leg_variables(walk.samples)
-    angle = legs["angle"].values
-    velocity = legs["velocity"].values
-    recorded = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
-    motion = add_strike_samples(recorded)
+    angle, velocity = (legs[name].values for name in ("angle", "velocity"))
+    motion = add_strike_samples(Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s))
     period, length = (float(rigid_gait[key]) for key in ("period_s", "step_length_m"))
-    interval = scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME)
-    stride = 1 if compass else COARSE_STRIDE
-    limit = Limit(scene.ground, period, length, motion, walk.steps, interval, stride)
+    interval = scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * contact.SAMPLES_PER_PENDULUM_TIME)
+    limit = Limit(scene.ground, period, length, motion, walk.steps, interval, 1 if compass else COARSE_STRIDE)
     # Only the compass has point feet in the rigid model and round feet in the contact model.
     compared = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_SERIES if compass else GAIT_SERIES
     progress.start("tune: rigid limit", len(compared) + len(gaits))
 
     def start(walker: ContactWalker) -> State:
-        return start_state(replace(scene, walker=walker), walk.start)
+        return contact.start_state(replace(scene, walker=walker), walk.start)
 
     series: dict[str, list[Distance]] = {}
-    for name in compared:
+    for name in (*compared, *gaits):
         walker = scene.walker
-        if name != ALL_SERIES:  # the series with point feet, as in the rigid model
+        if name == ALL_POINT_SERIES:  # point feet, as in the rigid model
             points = config.walker.model_copy(update={"foot_radius_m": 0.0})
-            rules = knee_rules(config.walker)
+            rules = contact.knee_rules(config.walker)
             laws = walker.normal, walker.friction
             ground = config.gravity_m_s2, config.slope_rad
-            walker = contact_walker(assembly_of(points), *laws, *ground, rules, drives=contact_drives(config))
-        series[name] = limit.series(name, walker, gait, start)
-        progress.advance()
-    for name in gaits:
-        series[name] = limit.series(name, scene.walker, gait)
+            walker = contact_walker(assembly_of(points), *laws, *ground, rules, drives=contact.contact_drives(config))
+        series[name] = limit.series(name, walker, gait, start if name in compared else None)
         progress.advance()
     return LimitFindings(compared, limit.period_s, gait.period_s, series, extrapolate(series[STICTION_SERIES]))
 
@@ -171,12 +157,11 @@ def limit_summary(findings: LimitFindings) -> dict[str, Any]:
     reaches = {}
     for name in findings.walk_series:
         distances = [distance for distance in findings.series[name] if distance.angle_error_rad is not None]
-        within = (distance for distance in distances if (distance.angle_error_rad or 0.0) <= LARGEST_ERROR.value)
-        first = next(within, None)
+        within = (setting(each) for each in distances if (each.angle_error_rad or 0.0) <= LARGEST_ERROR.value)
         reaches[name] = {
             "claim_rad": LARGEST_ERROR.value,
             "settings": [setting(distance) for distance in distances],
-            "first_within_claim": None if first is None else setting(first),
+            "first_within_claim": next(within, None),
         }
     orders = {name: observed_orders(rows) for name, rows in findings.series.items()}
     return {"orders": orders, "reaches": reaches, "causes": causes(findings)}
@@ -221,8 +206,7 @@ def limit_groups(findings: LimitFindings) -> dict[str, Group]:
     groups = {}
     text = "number of the setting, beginning with the config's contact"
     for series, rows in findings.series.items():
-        shown = [distance for distance in rows if distance.angle_error_rad is not None] or rows
-        if shown:
+        if shown := [distance for distance in rows if distance.angle_error_rad is not None] or rows:
             settings = rows_group([row.setting for row in shown], FACTOR_LABELS, SETTING, text)
             # Without a compared walk, its columns are missing.
             labels = {name: DISTANCE_LABELS[name] for name in DISTANCE_LABELS if getattr(shown[0], name) is not None}
@@ -255,8 +239,7 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     tune.find(progress, jobs)
     stored = groups(tune)
     report = summary(tune) | {"left_out": list(adjustment_omissions(config))}
-    limit = limit_findings(tune, rigid_gait, progress) if config.tune.rigid_limit else None
-    if limit is not None:
+    if config.tune.rigid_limit and (limit := limit_findings(tune, rigid_gait, progress)):
         stored |= limit_groups(limit)
         report |= limit_summary(limit)
     return Content(stored, report)
@@ -284,7 +267,7 @@ class TuneRun:
         self.tolerances = contact.tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
         self.pins_foot = is_passive_compass(config)
-        self.starts = build_scaled_starts(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
+        self.starts = contact.build_scaled_starts(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []
@@ -302,10 +285,9 @@ class TuneRun:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*UNCHANGED_START)
-        quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
+        quick = contact.scale_for_map(self.starts, self.as_it_stands.evaluations)
         rows = [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance]
-        computed = map_in_order(rows, jobs)
-        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, computed, swing.size)]
+        cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, map_in_order(rows, jobs), swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
         progress.start("tune: rigid map and margins")
         self.rigid_map = scaled_starts.rigid_map(self.rigid, self.rigid_state, swing, stance, self.steps)
@@ -379,7 +361,6 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
 
 
 def summary(tune: TuneRun) -> dict[str, Any]:
-    paper = tune.paper
     pitch = tune.scene.pitch_m
     ends = count_outcomes(tune.contact_map.outcome)
     pads = Pads((pitch, pitch), laid=str(contact.require_contact(tune.config).pad_pitch))
@@ -387,7 +368,7 @@ def summary(tune: TuneRun) -> dict[str, Any]:
         "table2": table_2(tune),
         "gait": gait_summary(tune),
         "adjustment": adjustment_summary(tune),
-        **({} if paper is None else {"paper_start": summarise_adams_start(paper)}),
+        **({} if tune.paper is None else {"paper_start": summarise_adams_start(tune.paper)}),
         "procedure": {**tune.printed, "adjusted": tune.printed.get("adjusted")},
         "map": {
             "cells": int(tune.contact_map.outcome.size),
@@ -523,7 +504,6 @@ def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
 
 def groups(tune: TuneRun) -> dict[str, Group]:
     stored = {"map": map_group(tune)}
-    walker = tune.scene.walker
     if tune.margins:
         labels = {
             "name": Label("", "what is scaled"),
@@ -538,11 +518,11 @@ def groups(tune: TuneRun) -> dict[str, Group]:
         stored["rigid_start"] = Group({**in_time, **step_columns(tune.rigid_walk.touch_time_s)})
     for name, walk in tune.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
-            stored[name] = Group({**legs_in_time(walk, walker), **step_columns(walk.touch_time_s)})
+            stored[name] = Group({**legs_in_time(walk, tune.scene.walker), **step_columns(walk.touch_time_s)})
     if tune.paper is not None:
         energy = {"mechanical_J": Variable(tune.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
         forces = variables_over_time(normal_force_N=tune.paper.normal)
-        stored["paper_start"] = Group({**legs_in_time(tune.paper.walk, walker), **forces, **energy})
+        stored["paper_start"] = Group({**legs_in_time(tune.paper.walk, tune.scene.walker), **forces, **energy})
     return stored
 
 
@@ -557,23 +537,20 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
 def map_group(tune: TuneRun) -> Group:
     """Build the group with the outcome and steps of both models over the two velocity factors."""
     cells = tune.contact_map
-    rigid = tune.rigid_map
     swing = "swing_factor"
     stance = "stance_factor"
     over = {
         "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
         "steps": (cells.steps, "steps of the contact model"),
         "settled": (cells.settled, "1 if the last step equals the contact gait's within two percent"),
-        "rigid_outcome": (rigid.outcome, "outcome of the rigid model's walk"),
-        "rigid_steps": (rigid.steps, "steps of the rigid model"),
+        "rigid_outcome": (tune.rigid_map.outcome, "outcome of the rigid model's walk"),
+        "rigid_steps": (tune.rigid_map.steps, "steps of the rigid model"),
     }
     factor = "factor on the {} leg's initial angular velocity"
     attrs: dict[str, Any] = {"outcomes": OUTCOMES, "steps_wanted": tune.steps}
-    change = tune.adjustment
-    if change is not None:
+    if change := tune.adjustment:
         attrs |= {"adjusted_swing_factor": change.swing, "adjusted_stance_factor": change.stance}
-    factors = tune.gait_factors
-    if factors is not None:
+    if factors := tune.gait_factors:
         attrs |= {"gait_swing_factor": factors[0], "gait_stance_factor": factors[1]}
     variables = {
         swing: Variable(cells.swing, (swing,), "1", factor.format("swing")),

@@ -56,8 +56,7 @@ def all_cases(user_cases: Sequence[Case], catalogue: Sequence[Case] | None = Non
     Raises ConfigError if two cases share a name.
     """
     catalogue = package_cases() if catalogue is None else catalogue
-    shared = {case.name for case in catalogue} & {case.name for case in user_cases}
-    if shared:
+    if shared := {case.name for case in catalogue} & {case.name for case in user_cases}:
         raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(shared))}.", UNIQUE_NAME_ADVICE)
     return (*catalogue, *check_unique_names(user_cases))
 
@@ -68,8 +67,7 @@ def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
     Raises ConfigError if two of them share a name.
     """
     names = [case.name for case in cases]
-    doubled = sorted({name for name in names if names.count(name) > 1})
-    if doubled:
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
         raise ConfigError(
             f"Case names must differ, but these are used more than once: {', '.join(doubled)}.", UNIQUE_NAME_ADVICE
         )
@@ -172,9 +170,8 @@ def scale_config(config: Config, by: Units) -> Config:
     # A law of an extension may give its parameters other units. Hip and knees use the same names for them, so one
     # mapping serves both.
     law_units = hinge_law_of(config.walker).units(by.energy, by.time)
-    walker = scale_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True)))
     changes: dict[str, object] = {
-        "walker": walker,
+        "walker": scale_block(config.walker, by, dict(zip(HINGE_PARAMETERS, law_units, strict=True))),
         "gravity_m_s2": config.gravity_m_s2 * by.length / by.time**2,
         "push_off": scale_block(config.push_off, by, {}),
     }

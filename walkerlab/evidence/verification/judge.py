@@ -22,17 +22,9 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.trials import walk_as_a_script
-from walkerlab.evidence.paper.appendix_a import RigidWalker
-from walkerlab.evidence.paper.walker import compass_or_none
+from walkerlab.evidence.paper.appendix_a import RigidWalker, compass_or_none
 from walkerlab.evidence.verification.catalogue import config_of, pendulum_time, scale_config, to_twin
-from walkerlab.evidence.verification.starts import (
-    ContactStart,
-    JudgedWalk,
-    RigidStart,
-    Start,
-    case_tolerances,
-    prepare_start,
-)
+from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, RigidStart, Start, prepare_start
 from walkerlab.evidence.verification.verdict import (
     BUDGET_USED,
     CaseResult,
@@ -86,9 +78,8 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     # The lock of a knee is an event, and the script for rigid scenes covers only the walker of Appendix A.
     if not is_passive_compass(config):
         return ()
-    short = case.model_copy(
-        update={"steps": min(case.steps, COMPARED_STEPS), "budget": max(case.budget, MIN_REFERENCE_BUDGET)}
-    )
+    changes = {"steps": min(case.steps, COMPARED_STEPS), "budget": max(case.budget, MIN_REFERENCE_BUDGET)}
+    short = case.model_copy(update=changes)
     start = prepare_start(config, short)
     compass = compass_or_none(config, config.equations)
     if isinstance(start, RigidStart) and compass is not None:
@@ -240,7 +231,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     start = prepare_start(config, case)
     if start is None:
         return CaseResult(*about, outcome=Outcome.REJECTED.label, second_tried="no start exists")
-    methods = case_tolerances(start, case)
+    methods = start.tolerances(case)
     began = time.perf_counter()
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
@@ -276,16 +267,14 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
     """Repeat a walk in ways that must lead to the same times, and return pairs (description, walk)."""
-    tighter = start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR))
-    again = [("the walk with ten times tighter tolerance", tighter)]
+    again = [("the walk with ten times tighter tolerance", start.walk(case, start.tolerances(case, TIGHTER_FACTOR)))]
     if second.walk is not None:
         again.append((f"the walk with {second.method}", second.walk))
     if case.twin:
         scale = to_twin(config)
         twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
-        twin = prepare_start(scale_config(config, scale), twin_case)
-        if twin is not None:
-            again.append(("the walk of the twin", twin.walk(case, case_tolerances(twin, case))))
+        if (twin := prepare_start(scale_config(config, scale), twin_case)) is not None:
+            again.append(("the walk of the twin", twin.walk(case, twin.tolerances(case))))
     return again
 
 
@@ -294,8 +283,7 @@ def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case
 
     Return an empty list if an end time is needed and missing.
     """
-    steps = min(first.touches.size, second.touches.size, case.compared_steps)
-    if steps:
+    if steps := min(first.touches.size, second.touches.size, case.compared_steps):
         difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
     elif first.end is None or second.end is None:
         return []

@@ -86,8 +86,7 @@ def run_until(
     Raises ArithmeticError if the run ends early.
     """
     frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
-    ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
-    walk_state = new_walk_state(walker, ground, 1, 1, start)
+    walk_state = new_walk_state(walker, JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame), 1, 1, start)
     walk_state.at_zero[:] = 0
     # Date the last touch so that the rule that ends walks without heel strikes ends this run at `duration_s`.
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
@@ -182,10 +181,9 @@ def restitution(law: Impact, speed: float) -> float:
 
 def block_speed(slope: float, start_speed: float) -> float:
     """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
-    law = PAPER_LAW
-    foot = law.resting_foot(BLOCK_MASS * EARTH_GRAVITY * math.cos(slope), BLOCK_MASS)
+    foot = PAPER_LAW.resting_foot(BLOCK_MASS * EARTH_GRAVITY * math.cos(slope), BLOCK_MASS)
     # The block starts at the depth at which it would rest, so that it neither falls nor bounces.
-    block = rig(BLOCK_MASS, 1.0, law, slope=slope)
+    block = rig(BLOCK_MASS, 1.0, PAPER_LAW, slope=slope)
     return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
 
@@ -248,19 +246,17 @@ PROBLEMS: Final = (
         source="closed form: free flight and half a period of the spring", limit=1e-7,
         why="the tolerance, over five bounces",
     ),
-    partial(
-        solve_problem, "ball dropped on the IMPACT law", "restitution at 0.5 m/s, a hundredth of the paper's damping",
-        partial(restitution, LIGHT_LAW, 0.5),
-        partial(references.restitution, BLOCK_MASS, 0.5, LIGHT_LAW, EARTH_GRAVITY),
-        source="SciPy DOP853 on the law as written in its manual", limit=1e-6,
-        why="1000 x the tolerance",
-    ),
-    partial(
-        solve_problem, "ball dropped on thicker ground", "restitution at 0.5 m/s, a tenth of the paper's damping",
-        partial(restitution, THICK_LAW, 0.5),
-        partial(references.restitution, BLOCK_MASS, 0.5, THICK_LAW, EARTH_GRAVITY),
-        source="SciPy DOP853 on the law as written in its manual", limit=1e-6,
-        why="1000 x the tolerance",
+    *(
+        partial(
+            solve_problem, name, f"restitution at 0.5 m/s, {share} of the paper's damping",
+            partial(restitution, law, 0.5), partial(references.restitution, BLOCK_MASS, 0.5, law, EARTH_GRAVITY),
+            source="SciPy DOP853 on the law as written in its manual", limit=1e-6,
+            why="1000 x the tolerance",
+        )
+        for name, share, law in (
+            ("ball dropped on the IMPACT law", "a hundredth", LIGHT_LAW),
+            ("ball dropped on thicker ground", "a tenth", THICK_LAW),
+        )
     ),
     partial(
         solve_problem, "block on an incline that holds it", "creep speed on 0.2 rad, m/s",

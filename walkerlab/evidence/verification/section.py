@@ -22,22 +22,20 @@ Rows = Sequence[Row]
 def section(results: page.Results, summary: Row) -> page.Section | None:
     """Build the section, or return None if the stage did not run."""
     cases = summary["cases"]
-    problems = summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     unmeasured = [
         {**row, "why": f"{measure['measure']}: {measure['why']}"} for row in cases for measure in row["not_measured"]
     ]
     note = words("stability.cases", group_by_reason(unanswered), group_by_reason(unmeasured))
     planes = results.summary("stability-maps")
+    not_covered = tuple(page.Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())
     blocks: tuple[page.PageBlock, ...] = (
         *(page.Paragraph(failure, "bad") for failure in failures(summary)),
         page.Paragraph(words("stability.judgement")),
         table("Extreme cases", CASE_COLUMNS, grouped(cases, "family"), wordy=True, note=note),
-        table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, problems, wordy=True),
+        table("Problems with known answers, run through the contact code", KNOWN_COLUMNS, summary["known"], wordy=True),
         page.Paragraph("Not covered:"),
-        page.Statements(
-            tuple(page.Statement(f"{what}:", why) for what, why in words.terms("stability.not_covered").items())
-        ),
+        page.Statements(not_covered),
         ordinary_table(summary),
         page.Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
         *(page.Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),

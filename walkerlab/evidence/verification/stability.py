@@ -65,10 +65,8 @@ def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[
 def resolve_scene(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     """Return the scene with a numeric start and pad pitch, which all its cases share."""
     step, start = rigid_start(config, inputs)
-    scene = Config().model_copy(
-        update={key: getattr(config, key) for key in keys_of(WalksConfig)}
-        | {"start": replace_state(config.start, start)}
-    )
+    values = {key: getattr(config, key) for key in keys_of(WalksConfig)}
+    scene = Config().model_copy(update=values | {"start": replace_state(config.start, start)})
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
         return scene

@@ -12,7 +12,7 @@ from walkerlab.config.reads import MapsConfig
 from walkerlab.config.schema import Config
 from walkerlab.evidence.verification import judge
 from walkerlab.evidence.verification.catalogue import config_of
-from walkerlab.evidence.verification.starts import ContactStart, case_tolerances, prepare_start
+from walkerlab.evidence.verification.starts import ContactStart, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import Tolerances
@@ -20,7 +20,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.pipeline.store.files import Checkpoint
+from walkerlab.pipeline.store.files import Checkpoint, Numbers
 
 PAPER_STIFFNESS: Final = Contact().to_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
@@ -36,8 +36,6 @@ TIGHTER_CELL_BUDGET = 1_200_000
 REFERENCE_CELL_BUDGET = 20_000_000
 MAX_FIXED_STEPS: Final = 5_000_000  # steps of semi-implicit Euler, more than any cell needs
 VERDICT_NAMES: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
-
-Numbers = list[float]
 
 
 def prepare_on_ground(
@@ -64,10 +62,10 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     number of right-hand sides.
     """
     case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
-    walk = again = start.walk(case, case_tolerances(start, case))
+    walk = again = start.walk(case, start.tolerances(case))
     if walk.outcome.answered:
         tighter = case.model_copy(update={"budget": TIGHTER_CELL_BUDGET})
-        again = start.walk(case, case_tolerances(start, tighter, judge.TIGHTER_FACTOR))
+        again = start.walk(case, start.tolerances(tighter, judge.TIGHTER_FACTOR))
     error = ERROR_MISSING
     if walk.outcome is again.outcome and walk.touches.size == again.touches.size:
         ends = np.abs(np.subtract(walk.record.end_state, again.record.end_state)) / judge.natural_units(config)

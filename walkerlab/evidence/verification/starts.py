@@ -47,9 +47,8 @@ class Masses:
 
     def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
         point_masses = list(masses(assembly))
-        root = about or point_masses[0][1]
         self.mass = np.array([mass for mass, _ in point_masses])
-        self.levers = np.array([levers(assembly, root, anchor) for _, anchor in point_masses])
+        self.levers = np.array([levers(assembly, about or point_masses[0][1], anchor) for _, anchor in point_masses])
         if about is None:
             self.levers = self.levers - np.average(self.levers, axis=0, weights=self.mass)
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
@@ -127,15 +126,13 @@ class SwingMasses:
         place, velocity = self.masses.moving(psi, rate)
         hip = centre + rotate(self.to_hip, psi).sum(axis=0)
         contact = rotate(self.to_foot, psi).sum(axis=0) + self.raised
-        mass = self.masses.mass
-        inertia = self.masses.inertia
-        return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
+        return Moving(self.masses.mass, centre + place, rolling + velocity, self.masses.inertia, rate, hip, contact)
 
     def share_of(self, leg: int) -> Floats:
         """Return the fraction of each body that belongs to a leg (bodies,): 0 or 1, except for coupled bodies."""
         names = [body.name for body in self.assembly.bodies]
         of_leg = self.assembly.legs[leg]
-        share = np.array([1.0 if name in of_leg else 0.0 for name in names])
+        share = np.array([float(name in of_leg) for name in names])
         for coupling in self.assembly.couplings:
             turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in of_leg)
             share[names.index(coupling.body)] = sum(turning)
@@ -252,11 +249,10 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
     """Compare the change of momentum with the impulse over the first `BALANCE_STEPS` steps of a case."""
-    mass = config.walker.total_mass_kg
     leg = config.walker.leg_length_m
     rates = np.abs(start[len(start) // 2 :])
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
-    scale = mass * np.array([speed, speed, speed * leg])
+    scale = config.walker.total_mass_kg * np.array([speed, speed, speed * leg])
     settings = config.solver.contact
     steps = min(case.steps, BALANCE_STEPS)
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
@@ -342,8 +338,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
         y = samples.states
         foot = np.column_stack([along[samples_range, pushing], height[samples_range, pushing]])
         angles = y[:, 2 : y.shape[1] // 2] + slope
-        s = np.sin(angles)
-        c = np.cos(angles)
+        s, c = np.sin(angles), np.cos(angles)
         x = form.hip_x[: angles.shape[1]]
         up = form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
@@ -410,6 +405,11 @@ class CaseStart:
     start: State
     energy: float  # J, m g L plus kinetic and elastic energy at the start, by which residuals are divided
 
+    def tolerances(self, case: Case, tighter: float = 1.0) -> Tolerances:
+        """Return the config's method and tolerances with the case's budget. `tighter` multiplies both tolerances."""
+        settings = self.config.solver.rigid if case.model == "rigid" else self.config.solver.contact
+        return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
+
     def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk. It keeps all its steps, because outcomes are compared, too."""
         return case
@@ -429,8 +429,7 @@ class RigidStart(CaseStart):
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches = walk.touch_time_s / pendulum_time(self.config)
-        work = walk.work
-        cost = work.rhs_evaluations, work.accepted
+        cost = walk.work.rhs_evaluations, walk.work.accepted
         off = walk.energy_balance_residual if self.walker.sprung else walk.energy_drift
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
@@ -444,12 +443,11 @@ class RigidStart(CaseStart):
         after = strikes.poses(record.after, first=1)
         pushes = (float(self.walker.push_off), float(self.walker.exchanged.push_off))
         distance = feet_off_the_slope(before) / self.walker.leg_length
-        momentum_change = strikes.momentum_change(before, after, pushes)
         # Push-offs may add energy.
         gain = 0.0 if any(pushes) else energy_gain(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
-            "momentum changed by a heel strike": momentum_change,
+            "momentum changed by a heel strike": strikes.momentum_change(before, after, pushes),
             "energy gained at a heel strike": finite(gain),
         }
         return [Measure(name, value, STRIKE_TOLERANCE) for name, value in measured.items()]
@@ -461,10 +459,9 @@ class ContactStart(CaseStart):
     scene: ContactScene
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
-        scene = self.scene
         unit = pendulum_time(self.config)
-        interval = scene.ground.frame.pendulum_time / SAMPLE_RATE if sampled else None
-        walk = scene.walk(self.start, case.steps, tolerances, interval)
+        interval = self.scene.ground.frame.pendulum_time / SAMPLE_RATE if sampled else None
+        walk = self.scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
         touches = walk.touch_time_s / unit
         end = walk.end_time_s / unit
@@ -493,13 +490,6 @@ class ContactStart(CaseStart):
 Start = RigidStart | ContactStart
 
 
-def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
-    """Return the config's method and tolerances with the case's budget. `tighter` multiplies both tolerances."""
-    solver = start.config.solver
-    settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
-    return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
-
-
 @cache
 def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
     """Find the gait of a walker. Gaits are cached, because most cases of a catalogue differ only in the ground."""
@@ -510,8 +500,7 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
     """Prepare the start of a case. Return None if the start or the pad pitch needs a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
-        gait = gait_of(walker, config.seed)
-        if gait is None:
+        if (gait := gait_of(walker, config.seed)) is None:
             return None
         state = as_state(gait.state)
         length = float(gait.step_length)

@@ -87,11 +87,9 @@ class DrakeRun(adapter.Simulation):
         self._context = self._simulator.get_mutable_context()
         self._at = self._plant.GetMyMutableContextFromRoot(self._context)
         self._declared: dict[int, Any] = {}
-        positions = np.zeros(len(q))
-        velocities = np.zeros(len(v))
-        positions[self._order], velocities[self._order] = q, v
-        self._plant.SetPositions(self._at, positions)
-        self._plant.SetVelocities(self._at, velocities)
+        state = np.zeros(2 * len(q))
+        state[self._order], state[self._rates] = q, v
+        self._plant.SetPositionsAndVelocities(self._at, state)
         if not self._discrete:
             ResetIntegratorFromFlags(self._simulator, name, self._h)
             integrator = self._simulator.get_mutable_integrator()
@@ -164,17 +162,14 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
     for link in model.links:
         inertia = RotationalInertia(*[link.inertia_kg_m2] * 3)
         centre = np.array((*link.centre_m, 0.0))
-        body_inertia = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
-        body = plant.AddRigidBody(link.name, body_inertia)
-        joints += join_to_parent(
-            plant, model, link, plant.world_body() if link.parent < 0 else bodies[link.parent], body
-        )
+        body = plant.AddRigidBody(link.name, SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia))
+        parent = plant.world_body() if link.parent < 0 else bodies[link.parent]
+        joints += join_to_parent(plant, model, link, parent, body)
         bodies.append(body)
     if own is None:
         return joints, [], None
     plant.set_contact_model(ContactModel.kPoint)
-    point = np.array((0.0, model.balls[0].ground_m, 0.0))
-    pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), point)
+    pose = HalfSpace.MakePose(np.array((0.0, 1.0, 0.0)), np.array((0.0, model.balls[0].ground_m, 0.0)))
     floor = plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "floor", material(own))
     feet = []
     for number, ball in enumerate(model.balls):
@@ -196,9 +191,8 @@ def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body
 
     child_frame = frame(body, f"{link.name} hinge", link.point_m)
     parent_frame = frame(parent, f"{link.name} on its parent", link.parent_point_m)
-    axis = np.array((0.0, 0.0, 1.0))
     if link.parent >= 0 or model.freedoms == ("turn",):
-        return [plant.AddJoint(RevoluteJoint(link.name, parent_frame, child_frame, axis))]
+        return [plant.AddJoint(RevoluteJoint(link.name, parent_frame, child_frame, np.array((0.0, 0.0, 1.0))))]
     if model.freedoms == ("along", "height", "turn"):
         return [plant.AddJoint(PlanarJoint(link.name, parent_frame, child_frame))]
     # Each of the two slides is a joint, and a body without mass must connect them.

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeVar
@@ -85,8 +86,7 @@ class OwnProcess:
     def abandon(self) -> None:
         """Kill the running task and reject further ones. This may be called from another thread."""
         self._abandoned = True
-        worker = self._worker
-        if worker is not None:
+        if (worker := self._worker) is not None:
             worker.process.kill()
 
     def _end(self) -> None:
@@ -354,8 +354,8 @@ class EngineOnScene:
         for integrator, entry in engine.adapter().INTEGRATORS.items():
             before: float | None = None
             for stepping in steppings(integrator, entry, SWING_STEPS):
-                swing = model, scene.ours.slope, start, SWING_S, entry.most_steps
-                answer = self.process.do(runs.SwingTask(engine.name, stepping, *swing).run, RUN_TIMEOUT_S)
+                about = engine.name, stepping, model, scene.ours.slope, start, SWING_S, entry.most_steps
+                answer = self.process.do(partial(runs.swing, *about), RUN_TIMEOUT_S)
                 if isinstance(answer, TaskLost):
                     lost.append(answer)
                     break
@@ -363,8 +363,7 @@ class EngineOnScene:
                 drift = abs(energy(answer.end) - energy(start))
                 order = math.log2(before / error) if before and error and not entry.adapts else None
                 who = (scene.name, engine.name, integrator, entry.order)
-                how = (stepping.step_s, stepping.tolerance)
-                rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
+                rows.append(SwingRow(*who, stepping.step_s, stepping.tolerance, error, drift, order, answer.wall_s))
                 before = error
         return rows, lost
 

@@ -60,17 +60,13 @@ class ExudynRun(adapter.Simulation):
 
         self._container = exu.SystemContainer()
         self._system = self._container.AddSystem()
-        zero = [0.0] * model.size
-        position = q.tolist()
-        velocity = v.tolist()
         start = NodeGenericODE2(
-            referenceCoordinates=zero,
-            initialCoordinates=position,
-            initialCoordinates_t=velocity,
-            numberOfODE2Coordinates=len(zero),
+            referenceCoordinates=[0.0] * model.size,
+            initialCoordinates=q.tolist(),
+            initialCoordinates_t=v.tolist(),
+            numberOfODE2Coordinates=model.size,
         )
-        node = self._system.AddNode(start)
-        tree, places = add_tree(self._system, model, node, self.forces)
+        tree, places = add_tree(self._system, model, self._system.AddNode(start), self.forces)
         self._contacts = [] if self.own is None else list(add_contacts(self._system, model, tree, places, self.own))
         self._system.Assemble()
 
@@ -117,12 +113,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
     from exudyn.itemInterface import ObjectKinematicTree
 
     kinds = {"along": exu.JointType.PrismaticX, "height": exu.JointType.PrismaticY, "turn": exu.JointType.RevoluteZ}
-    joints: list[Any] = []
-    parents = []
-    offsets = []
-    centres = []
-    masses = []
-    inertias = []
+    pieces: list[tuple[Any, ...]] = []
     places: list[int] = []
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
@@ -130,15 +121,14 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
             # Each degree of freedom of the base needs a separate link. Only the last of these links may have mass.
             last = freedom == freedoms[-1]
             hangs = link.parent >= 0
-            offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)
+            offset = link.parent_point_m if hangs or not pieces else (0.0, 0.0)
             from_hinge = np.subtract(offset, model.links[link.parent].point_m if hangs else (0.0, 0.0))
-            joints.append(kinds[freedom])
-            parents.append(places[link.parent] if hangs else len(joints) - 2)
-            offsets.append([*from_hinge, 0.0])
-            centres.append([*np.subtract(link.centre_m, link.point_m), 0.0] if last else [0.0, 0.0, 0.0])
-            masses.append(link.mass_kg if last else 0.0)
-            inertias.append(link.inertia_kg_m2 * NO_ROTATION if last else 0.0 * NO_ROTATION)
-        places.append(len(joints) - 1)
+            parent = places[link.parent] if hangs else len(pieces) - 1
+            centre = [*np.subtract(link.centre_m, link.point_m), 0.0] if last else [0.0, 0.0, 0.0]
+            mass, inertia = (link.mass_kg, link.inertia_kg_m2) if last else (0.0, 0.0)
+            pieces.append((kinds[freedom], parent, [*from_hinge, 0.0], centre, mass, inertia * NO_ROTATION))
+        places.append(len(pieces) - 1)
+    joints, parents, offsets, centres, masses, inertias = map(list, zip(*pieces, strict=True))
 
     def applied(_system: Any, time_s: float, _item: Any, q: Any, v: Any) -> Any:
         assert forces is not None, "only called with forces"

@@ -128,8 +128,7 @@ class RuleFollower:
                 if self.turn is not None:
                     return False
             self._bends = bends
-        happened = has_event(before, now, self._edges)
-        if happened:
+        if happened := has_event(before, now, self._edges):
             self._apply_events(time_s, before, now, q, v)
         self._feet = now
         self.time_s = time_s
@@ -170,8 +169,7 @@ class RuleFollower:
                 contact_transitions.lift(form, walk_state, feet_at_event, foot, time_at_event, y)
             else:
                 self._end(contact_transitions.touch(form, walk_state, feet_at_event, foot, time_at_event, y))
-        completed = walk_state.progress.steps == walk_state.touch_time.size
-        if completed and not contact_state.has_not_lifted(walk_state):
+        if walk_state.progress.steps == walk_state.touch_time.size and not contact_state.has_not_lifted(walk_state):
             self._end(Outcome.WALKED)
 
     @property
@@ -206,21 +204,19 @@ class RuleFollower:
             self.outcome = Outcome(outcome)
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
-        ground = self.scene.ground
         has_ground = self.walk_state.has_ground
-        tau = ground.frame.pendulum_time
-        t = self.time_s
+        tau = self.scene.ground.frame.pendulum_time
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
-            self.grounded_s = t
+            self.grounded_s = self.time_s
             stance = int(self.walk_state.progress.stance)
             if inside[stance] and has_slid(self.scene, self.walk_state, stance, now[stance].along, q, v):
                 self._end(Outcome.SLID)
-        elif t - self.grounded_s > LONGEST_FLIGHT * tau:
+        elif self.time_s - self.grounded_s > LONGEST_FLIGHT * tau:
             self._end(Outcome.LIFTED_OFF)
-        if q[1] < FALLEN_HIP * ground.frame.leg_length:
+        if q[1] < FALLEN_HIP * self.scene.ground.frame.leg_length:
             self._end(Outcome.FELL)
-        elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
+        elif self.time_s - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
             self._end(Outcome.NO_HEEL_STRIKE)
 
 
@@ -239,8 +235,7 @@ def has_slid(scene: EngineScene, walk_state: WalkState, foot: int, along: float,
     if abs(along - walk_state.foothold[foot]) <= far:
         return False
     # A round foot also moves away from its foothold by rolling. It has slid only if its material has moved.
-    y = tuple(scene.about_centre(q, v).tolist())
-    material = contact_state.material_along(scene.ours.whole, foot, along, y)
+    material = contact_state.material_along(scene.ours.whole, foot, along, tuple(scene.about_centre(q, v).tolist()))
     return bool(abs(material - walk_state.touched[foot]) > far)
 
 

@@ -54,15 +54,14 @@ class WalkTask:
         walk = EngineWalk(self)
         walk.walk_to_end()
         rules = walk.rules
-        walk_state = walk.rules.walk_state
+        walk_state = rules.walk_state
         outcome = rules.outcome
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
         end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
         steps = int(walk_state.progress.steps)
-        lifted = steps_with_lift(walk_state)
         touches = walk_state.touch_time[:steps].copy(), walk_state.touch_along[:steps].copy()
-        slips = walk_state.slip[:lifted].copy()
+        slips = walk_state.slip[: steps_with_lift(walk_state)].copy()
         return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)
 
 
@@ -143,28 +142,22 @@ class SwingAnswer:
     wall_s: float
 
 
-@dataclass(frozen=True)
-class SwingTask:
-    """Free swing of the walker, pinned to the ground at its stance foot."""
+def swing(
+    engine: str, stepping: Stepping, model: planar.PlanarModel, slope: float, start: Floats, until_s: float, steps: int
+) -> SwingAnswer:
+    """Simulate the free swing of the walker, pinned to the ground at its stance foot.
 
-    engine: str
-    stepping: Stepping
-    model: planar.PlanarModel
-    slope: float
-    start: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
-    until_s: float
-    max_steps: int
-
-    def run(self) -> SwingAnswer:
-        chain = self.model.chain
-        absolute = np.column_stack((self.start[: len(chain)] + self.slope, self.start[len(chain) :]))
-        q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
-        engine = PHYSICS_ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
-        start_s = time.process_time()
-        motion = record_motion(engine, self.max_steps, self.until_s)
-        wall = time.process_time() - start_s
-        end = np.concatenate((chain @ motion.q[-1] - self.slope, chain @ motion.v[-1]))
-        return SwingAnswer(end, wall)
+    start  (2 n) absolute angles (rad) and velocities (rad/s)
+    steps  step budget of the engine
+    """
+    chain = model.chain
+    absolute = np.column_stack((start[: len(chain)] + slope, start[len(chain) :]))
+    q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
+    simulation = PHYSICS_ENGINES[engine].simulation(model, stepping, q, v)
+    start_s = time.process_time()
+    motion = record_motion(simulation, steps, until_s)
+    wall = time.process_time() - start_s
+    return SwingAnswer(np.concatenate((chain @ motion.q[-1] - slope, chain @ motion.v[-1])), wall)
 
 
 class EngineMotion(NamedTuple):
@@ -236,8 +229,7 @@ class TuningTask:
 
     def run(self) -> TuningAnswer:
         depth = self.penetration_at_rest()
-        ratio = self.damping_ratio(depth)
-        return TuningAnswer(self.own, depth, ratio, self.friction(depth), self.creep(depth))
+        return TuningAnswer(self.own, depth, self.damping_ratio(depth), self.friction(depth), self.creep(depth))
 
     def simulate_contact(
         self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]
@@ -262,9 +254,8 @@ class TuningTask:
 
     def penetration_at_rest(self) -> float:
         """Return the penetration at rest (m) of a ball that is released at the surface."""
-        return -float(
-            self.simulate_contact(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1]
-        )
+        motion = self.simulate_contact(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0))
+        return -float(motion.q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
         """Fit an oscillator to the accelerations of the ball, and return its damping ratio.
@@ -286,14 +277,13 @@ class TuningTask:
 
         depth  penetration at rest (m)
         """
-        target = self.target
         settled = self.settling_s
-        start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
+        start = self.sliding_velocity + self.target.friction * self.target.gravity * 1.25 * settled
         motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
         # Before the last fifth of the motion, the block is still settling into the ground.
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
-        return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
+        return float(fall / ((motion.t[-1] - motion.t[watched]) * self.target.gravity))
 
     def creep(self, depth: float) -> float:
         """Return the creep velocity (m/s) of a block that stands on an incline.
@@ -302,6 +292,5 @@ class TuningTask:
         """
         target = self.target
         h = STEADY_STEP_FACTOR * self.step_s
-        return float(
-            self.simulate_contact(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0]
-        )
+        motion = self.simulate_contact(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0))
+        return float(motion.v[-1, 0])

@@ -24,10 +24,9 @@ def section(_results: Results, summary: Row) -> Section | None:
         for experiment, text in items.items()
         if text
     ]
-    laws = grouped(summary["rows"], "experiment")
+    rows = grouped(summary["rows"], "experiment", "scene")
     same_law, own_law = (
-        {scene: [row for row in laws.get(law, ()) if row["scene"] == scene] for scene in summary["reference"]}
-        for law in (SAME_LAW, OWN_LAW)
+        {scene: rows.get(f"{law} {scene}", []) for scene in summary["reference"]} for law in (SAME_LAW, OWN_LAW)
     )
     for scene, reference in summary["reference"].items():
         if "rigid_period_s" in reference:

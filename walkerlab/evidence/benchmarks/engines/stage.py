@@ -234,8 +234,7 @@ def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[st
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
         for name, runs in series_by_name(rows, experiment).items():
-            target = exact if experiment == SAME_LAW else runs[-1].period_s
-            step = largest_good_step(runs, experiment, target)
+            step = largest_good_step(runs, experiment, exact if experiment == SAME_LAW else runs[-1].period_s)
             if step is not None:
                 steps[experiment][name] = step
     return steps
@@ -280,11 +279,9 @@ def conclusions(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str
     falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
     finest = [runs[-1] for runs in own.values()]
     settled = [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])]
-    best = closest(rows)
     period = float(truth.walk.periods_s[-1])
+    goal = plain_power(experiments.ERROR_GOAL)
     return {
-        SAME_LAW: words(
-            "engines.same_law", by_level, engines, sizes[SAME_LAW], falling, plain_power(experiments.ERROR_GOAL)
-        ),
-        OWN_LAW: words("engines.own_law", best, finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
+        SAME_LAW: words("engines.same_law", by_level, engines, sizes[SAME_LAW], falling, goal),
+        OWN_LAW: words("engines.own_law", closest(rows), finest, period, changes[OWN_LAW], settled, sizes[OWN_LAW]),
     }

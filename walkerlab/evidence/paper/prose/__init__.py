@@ -10,7 +10,5 @@ from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.paper import printed
 from walkerlab.views.prose import Prose, f
 
-PRINTED_VALUES = vars(printed) | {"pi": math.pi, "MM_PER_M": MM_PER_M}
-prose = Prose(
-    Path(__file__).parent, (f,), {name: value for name, value in PRINTED_VALUES.items() if not name.startswith("_")}
-)
+PRINTED_VALUES = {name: value for name, value in vars(printed).items() if not name.startswith("_")}
+prose = Prose(Path(__file__).parent, (f,), PRINTED_VALUES | {"pi": math.pi, "MM_PER_M": MM_PER_M})
