@@ -45,7 +45,7 @@ def test_public_names_describe_arguments_and_show_an_example(name):
         assert {"Returns", "Raises"} <= {*text.split()}
 
 
-def test_python_interface_does_not_use_any():
+def test_python_interface_does_not_use_the_type_any():
     texts = [path.read_text() for path in Path(api.__file__).parent.glob("*.py")]
     assert len(texts) > 3
     assert not any(re.search(r"\bAny\b", text) for text in texts)
@@ -468,7 +468,7 @@ def test_mujoco_model_with_changed_keys_starts_in_the_new_gait(mujoco):
     assert data.qpos[2] - np.deg2rad(3) == pytest.approx(steeper.state[1], abs=1e-12)
 
 
-def test_mujoco_model_without_a_gait_raises_no_answer(mujoco):
+def test_mujoco_model_without_a_gait_raises_the_error_no_answer(mujoco):
     with pytest.raises(NoAnswer, match="no gait"):
         walkerlab.mujoco_model(walkerlab.find_gait(slope_deg=-1))
 

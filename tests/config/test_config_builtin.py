@@ -46,7 +46,7 @@ def test_config_as_printed_differs_from_paper_only_in_its_equations() -> None:
     assert printed == paper.model_copy(update={"name": "paper-as-printed", "equations": "as-printed"})
 
 
-def test_config_wrong_units_reads_the_values_of_the_paper_as_si() -> None:
+def test_config_contact_si_reads_the_contact_values_of_the_paper_as_si() -> None:
     contact = load(Path("contact-si")).config.contact
     assert contact is not None
     law = contact.to_si()

@@ -232,7 +232,7 @@ def test_error_in_a_question_block_points_to_its_key(loaded: Loaded) -> None:
 @pytest.mark.parametrize(
     ("name", "terrain"), [("kneed", "plane"), ("parts", "plane"), ("round-feet", "after-mid-swing")]
 )
-def test_suggested_contact_block_is_scaled_by_mass_and_loads(loaded: Loaded, name: str, terrain: str) -> None:
+def test_suggested_contact_block_is_scaled_by_mass_and_can_be_loaded(loaded: Loaded, name: str, terrain: str) -> None:
     without = loaded(f"extends: {name}\ncontact: null\n").config
     contact = loaded(f"extends: {name}\n{contact_to_add(without.walker)}\n").config.contact
     built_in = load(Path(name)).config.contact

@@ -161,6 +161,6 @@ def test_any_punctuation_is_read_or_raises_config_error(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")
 
 
-def test_tab_gets_an_explanation() -> None:
+def test_tab_is_rejected_because_yaml_is_indented_by_spaces() -> None:
     with pytest.raises(ConfigError, match=r"^mine\.yaml:2:1: a tab: YAML is indented by spaces"):
         read("walker:\n\ttype: compass\n", "mine.yaml")

@@ -346,7 +346,7 @@ def test_points_of_kineticstoolkit_are_read_from_a_table(tmp_path):
     assert walk_right(tmp_path, "walk.csv", columns={"time": "column 1", **LEGS}, units={"time": "s"}) == []
 
 
-def test_time_deltas_and_dates_of_pandas_are_seconds(tmp_path):
+def test_time_deltas_and_dates_of_pandas_are_read_as_seconds(tmp_path):
     pandas = pytest.importorskip("pandas", reason="pandas is not installed")
     time, angle = sampled()
     deltas = pandas.to_timedelta(time, unit="s")
@@ -358,7 +358,7 @@ def test_time_deltas_and_dates_of_pandas_are_seconds(tmp_path):
         assert walk_right(tmp_path, "walk.csv") == []
 
 
-def test_dates_and_times_of_polars_are_seconds(tmp_path):
+def test_dates_and_times_of_polars_are_read_as_seconds(tmp_path):
     polars = pytest.importorskip("polars", reason="polars is not installed", exc_type=ImportError)
     time, angle = sampled()
     begin = datetime.datetime(2026, 12, 31, 23, 59, 58)

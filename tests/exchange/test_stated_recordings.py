@@ -260,7 +260,7 @@ CLOCKS = {
 
 
 @pytest.mark.parametrize("style", CLOCKS)
-def test_clock_times_are_seconds(style, tmp_path):
+def test_clock_times_are_converted_to_seconds(style, tmp_path):
     time, angle = sampled()
     rows = [(CLOCKS[style](t), *each) for t, each in zip(time.tolist(), angle, strict=True)]
     summary = steps_of(table(tmp_path, "time,angle 1 (rad),angle 2 (rad)", rows))

@@ -24,7 +24,7 @@ def cut_off(toy, monkeypatch, after, **options):
     monkeypatch.delenv("TOY_STONES")
 
 
-def test_campaign_runs_only_with_full(toy):
+def test_campaign_runs_only_with_the_option_full(toy):
     assert actions(toy.execute("survey")) == {"survey": "run"}
     report = toy.execute("survey", full=True)
     assert actions(report) == {"survey": "reuse", "census": "run"}

@@ -49,7 +49,7 @@ def test_unit_is_recomputed_after_an_accidental_death_of_its_worker(checkpoint, 
     assert done(units, checkpoint, jobs=2) == ([[0.0], [1.0], [0.0]], 3)
 
 
-def test_unit_that_always_kills_its_worker_ends_the_work_but_keeps_the_others(checkpoint):
+def test_unit_that_always_kills_its_worker_stops_the_work_but_other_results_are_kept(checkpoint):
     with pytest.raises(WorkerDiedError, match="SIGKILL"):
         done([*numbers_of(2), ("deadly", 1, calls.kill_itself)], checkpoint, jobs=2)
     assert Checkpoint(checkpoint.path, "key").kept == {"unit 0": [0.0], "unit 1": [1.0]}

@@ -310,7 +310,7 @@ def test_predicted_gain_of_freeing_a_doubted_parameter_is_close_to_that_of_a_ref
 
 
 @pytest.mark.parametrize("guesses", [(), ("slope_deg=3.2", HIP + "=9")])
-def test_wrong_guesses_of_the_estimates_raise_no_doubt(guesses):
+def test_wrong_initial_values_of_fitted_parameters_raise_no_doubt(guesses):
     result = identify(twenty_steps(), *guesses, fit={"slope_deg": None, HIP: None})
     assert result.verdict.fit == "fits"
 

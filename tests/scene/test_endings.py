@@ -38,7 +38,7 @@ def test_kneed_walkers_are_advised_to_use_a_plane():
     assert ground_causes("off-pad", kneed, contact=True)[-1] == "Try contact.terrain=plane."
 
 
-def test_ground_properties_are_causes_only_in_the_contact_model():
+def test_ground_properties_are_suggested_as_causes_only_for_contact_walks():
     assert ground_causes("lifted-off", PAPER, contact=False) == []
     assert "contact.stiffness" in ground_causes("lifted-off", PAPER, contact=True)[0]
     assert "contact.static_friction" in ground_causes("slid", PAPER, contact=True)[0]

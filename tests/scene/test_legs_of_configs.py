@@ -124,7 +124,7 @@ def test_walk_of_unequal_legs_on_pads_settles_on_the_contact_gait(leg_2):
     assert np.abs(off - off.mean()).max() < 1e-4
 
 
-def test_stance_times_last_from_touch_to_lift_of_each_foot():
+def test_stance_time_is_measured_from_touch_to_lift_of_each_foot():
     config = config_of("paper", HEAVY, "contact.pad_pitch=own")
     rigid = gait_of(config)
     scene = scene_on_pads(config, rigid.step_length, rigid.state)

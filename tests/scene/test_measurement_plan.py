@@ -78,7 +78,7 @@ def test_plan_needs_the_fewest_steps_for_the_requested_error(subject, options):
     assert errors(fewer, ANGLES).errors["slope_deg"] > 0.01
 
 
-def test_prior_determines_what_periods_cannot(subject):
+def test_prior_determines_a_slope_that_periods_do_not_determine(subject):
     weighed = Identify(fit=dict.fromkeys(KEYS), prior={"slope_deg": [3.0, 0.01]})
     error = errors(plan_measurements(subject, weighed, PLAN), "periods").errors["slope_deg"]
     assert error == pytest.approx(0.01, rel=0.05)

@@ -71,10 +71,10 @@ def test_no_slow_command_is_suggested_without_a_nearby_gait():
     assert "--set" not in advice
 
 
-def test_no_nearby_gait_is_searched_uphill():
+def test_no_nearby_gait_is_suggested_on_level_ground():
     assert suggest_gaits(config("slope_deg=0")) == ""
 
 
-def test_ends_of_a_range_of_slopes_are_rounded_to_its_inside():
+def test_ends_of_a_range_of_slopes_are_rounded_inwards():
     assert round_inward(0.40001, 4.1399) == pytest.approx((0.401, 4.13), abs=1e-12)
     assert round_inward(4.1391, 4.1395) == (4.1391, 4.1395)

@@ -68,7 +68,7 @@ def test_reference_without_taylor_series_is_also_computed_by_two_methods():
     assert reference.agreement < 1e-10
 
 
-def test_taylor_walk_whose_state_overflows_has_no_end():
+def test_taylor_walk_whose_state_overflows_has_no_end_state():
     pytest.importorskip("heyoka")
     assert walk_by_taylor(TRIAL.compass, (-0.2, 0.17, 0.0, 1e200), 1) is None
 
@@ -85,7 +85,7 @@ def test_compiled_and_scipy_methods_agree_within_tolerance(rows):
     assert max(tightest.values()) < 100 * LADDER[-1]
 
 
-def test_numpy_script_needs_the_same_work_as_the_method(rows):
+def test_numpy_script_needs_no_more_evaluations_than_scipy_dop853(rows):
     work = {row.method: row.rhs_evaluations for row in rows if row.tolerance == 1e-7}
     assert 0.5 * work["scipy-dop853"] < work[USER_SCRIPT] <= work["scipy-dop853"]
 

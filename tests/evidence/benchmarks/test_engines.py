@@ -91,7 +91,7 @@ def test_failed_run_is_a_row_and_a_timed_out_run_is_not_refined(lost, outcome, r
     assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.reason, None)}
 
 
-def test_every_engine_has_an_adapter_with_one_signature():
+def test_every_engine_adapter_uses_known_integrators_and_states_what_it_cannot_express():
     for engine in PHYSICS_ENGINES.values():
         adapter = engine.adapter()
         assert set(adapter.CONTACTS.values()) <= set(adapter.INTEGRATORS)

@@ -50,7 +50,7 @@ def written(folder, text, name="my.yaml"):
         ("0", 0.3, 1),
     ],
 )  # fmt: skip
-def test_digits_agree_if_the_right_value_rounds_to_them_or_is_cut_off(text, right, agreeing):
+def test_printed_digits_agree_if_they_are_the_right_value_rounded_or_truncated(text, right, agreeing):
     assert equal_digits(digits_of(text), right) == agreeing
 
 

@@ -223,7 +223,7 @@ def test_evidence_consists_of_capitalised_sentences(rows):
         assert not re.search(r"[a-z)]\. [a-z]", row.evidence), row.evidence
 
 
-def test_rounding_is_allowed_for_before_a_value_counts_as_contradicted(rows):
+def test_value_counts_as_contradicted_only_if_rounding_cannot_explain_it(rows):
     row = rows()[TABLE_2[0].percent]  # Unrounded, -0.2022 and -0.2021 may differ by up to 0.1 %.
     assert (row.verdict, "a change of -0.10 to +0.00%, given the rounding" in row.evidence) == (
         Verdict.EXPLAINED,
@@ -267,7 +267,7 @@ def test_start_that_walks_does_not_explain_a_fall(rows):
     assert rows(from_x_p=(1, "fell"))[LOST_BALANCE].verdict == Verdict.REPRODUCED
 
 
-def test_adams_start_falls_when_an_independent_integration_does(study):
+def test_adams_start_leads_to_a_fall_at_the_time_found_by_an_independent_integration(study):
     walker = walker_of_the_paper(CORRECTED)._replace(slope=study.adams.slope)
 
     def hip(_time, y):

@@ -51,7 +51,7 @@ def test_case_ends_as_expected_and_passes_every_check(name):
     assert result.failures == ()
 
 
-def test_errors_of_a_long_rigid_walk_do_not_add_up():
+def test_errors_of_a_long_rigid_walk_do_not_accumulate():
     case = CASES["rigid-1000-strides"]
     assert case.steps == case.compared_steps == 2000
     result = judge(case.model_copy(update={"steps": 300, "compared_steps": 300}), config_of(case))

@@ -130,7 +130,7 @@ def test_twin_of_a_walker_scales_hinge_parameters_by_the_units_of_their_law(monk
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
-def test_driven_walkers_of_two_sizes_are_equal_at_unit_size(name):
+def test_driven_walker_and_its_scaled_copy_are_equal_in_dimensionless_units(name):
     hip = (f"walker.hip.{number}=0.01" for number in Hip.model_fields if number != "hinge_law")
     sets = (*hip, "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config

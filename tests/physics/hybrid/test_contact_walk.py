@@ -40,7 +40,7 @@ NEAR_RIGID = (
 # ---- measured by two other programs ---------------------------------------------------------------------------------
 
 
-def test_ten_steps_settle_slower_and_shorter_than_the_rigid_gait():
+def test_tenth_step_on_compliant_ground_is_slower_and_shorter_than_the_rigid_gait():
     walk = walked()
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s.shape == (10,)

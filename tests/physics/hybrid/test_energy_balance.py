@@ -56,7 +56,7 @@ def test_explained_residual_grows_with_the_tolerance():
     assert tight.energy_balance_residual_J < tight.explained_residual_J
 
 
-def test_command_fails_and_reports_the_energy_residual(nothing_explained):
+def test_contact_sim_fails_on_an_unexplained_energy_residual_and_reports_it(nothing_explained):
     scene_sets = ("slope_deg=1", f"start={list(FIXED_POINT)}", f"contact.pad_pitch={RIGID_STEP}", "outputs=[]")
     with pytest.raises(NoAnswer) as refused:
         contact_sim.run(contact_walks.load(None, scene_sets).config, {}, Silent())

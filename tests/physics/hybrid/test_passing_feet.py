@@ -56,7 +56,7 @@ def test_foot_in_the_air_is_supported_only_while_it_is_ahead(carried):
 
 @pytest.mark.parametrize("forward", [FORWARD, BACK])
 @pytest.mark.parametrize("carried", [False, True])
-def test_passing_in_the_ground_has_no_effect_until_the_foot_lifts(forward, carried):
+def test_passing_below_the_surface_changes_the_support_only_when_the_foot_lifts(forward, carried):
     feet = Feet("after-mid-swing", GROUND).passing(forward, carried)
     assert feet.carried == carried
     assert feet.lifting().carried == forward

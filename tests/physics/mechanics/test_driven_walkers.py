@@ -178,7 +178,7 @@ def test_push_off_acts_on_the_free_walker_just_before_the_strike(assembly, model
 
 
 @driven
-def test_derivatives_of_driven_strikes_and_swings_equal_their_slopes(assembly, model, free):
+def test_derivatives_of_driven_strikes_and_swings_equal_finite_differences(assembly, model, free):
     y, h = both_feet_down(model, free), 1e-5
     n = len(model.arm_x)
     angles = state_linked(model, AT_STRIKE, (*np.linspace(0.3, -0.2, n), *np.linspace(-0.5, 0.7, n)))

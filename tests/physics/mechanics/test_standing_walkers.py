@@ -227,7 +227,7 @@ def differences(f, y, h=1e-5, along=None):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 @given(numbers=free)
-def test_jacobian_equals_the_slope_of_the_rates(phase, numbers):
+def test_jacobian_equals_finite_differences_of_the_rates(phase, numbers):
     y = np.array(kneed_state(numbers))
     J = np.full((8, 8), np.nan)
     mode_jacobian(Mode(KNEED, phase), 0.0, y, J)

@@ -213,7 +213,7 @@ def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
     assert driven.hip_torque == pytest.approx(driven.hip, rel=1e-9)
 
 
-def test_cost_derivative_across_a_knee_strike_equals_an_independent_slope():
+def test_cost_derivative_across_a_knee_strike_equals_a_difference_quotient():
     """The parameter is the stiffness of the hip spring, and the knee strike reverses the relative rate of the
     thighs.
     """

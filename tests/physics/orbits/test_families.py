@@ -291,7 +291,7 @@ def test_gait_just_beyond_a_flip_is_on_the_doubled_branch():
     assert follower.family([seed], 2, known) == known
 
 
-def test_branch_entered_elsewhere_begins_at_its_flip_without_shorter_gaits():
+def test_branch_followed_from_its_middle_begins_at_its_flip_without_gaits_of_half_its_period():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.07, 0.08))
     one, doubled = follower.family([seeds_at(paper_walker, 0.072)[-1]], 2)
     (flip,) = (each for each in one.bifurcations if each.kind == "flip")
@@ -522,7 +522,7 @@ def test_only_repeating_sequences_have_a_period():
     assert find_period(np.random.default_rng(0).standard_normal((30, 2))) == 0
 
 
-def test_neighbours_may_diverge_next_to_a_positive_exponent():
+def test_walks_may_diverge_at_values_next_to_a_positive_lyapunov_exponent():
     exponents = [Lyapunov(4.0, -0.2, 0.01), Lyapunov(5.0, -0.1, 0.01), Lyapunov(6.0, 0.3, 0.01)]
     assert not may_diverge(exponents, 4.5)
     assert not may_diverge(exponents, 4.0)

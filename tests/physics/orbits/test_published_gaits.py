@@ -81,7 +81,7 @@ def test_knee_strike_comes_at_the_published_time():
 
 
 @pytest.mark.parametrize("at_strike", ["locked", "free"])
-def test_step_derivative_through_the_knee_strike_equals_its_slope(at_strike):
+def test_step_derivative_through_the_knee_strike_equals_finite_differences(at_strike):
     model = rigid_on_slope(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
     shooting = RigidStepper(model, TIGHT)
     z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.section_indices)]

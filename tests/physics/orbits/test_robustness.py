@@ -321,7 +321,7 @@ def test_failed_walk_has_fewer_steps_and_an_outcome():
     assert walk.durations_s.size < 3
 
 
-def test_gradient_chooses_a_step_of_small_error():
+def test_gradient_uses_a_difference_step_that_keeps_the_error_small():
     """With twice the usual step, the hip mass would leave the range over which the gait of the level compass changes
     smoothly.
     """

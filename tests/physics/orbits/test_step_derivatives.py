@@ -71,7 +71,7 @@ def beside_the_gait(walker, offset):
 
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
 @pytest.mark.parametrize("name", WALKERS)
-def test_rigid_step_derivative_equals_its_slope(name, offset):
+def test_rigid_step_derivative_equals_finite_differences(name, offset):
     """The derivative passes the swing by the variational equations, and the heel strike by the saltation matrix."""
     walker = WALKERS[name]
     step_map, z = unit_map(walker), beside_the_gait(walker, offset)

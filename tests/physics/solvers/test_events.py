@@ -137,5 +137,5 @@ def test_event_function_leaves_its_zero_in_the_right_direction_despite_a_small_o
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
 
 
-def test_values_within_rounding_give_no_direction_from_zero():
+def test_event_function_that_is_zero_to_rounding_leaves_zero_in_no_direction():
     assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

@@ -265,7 +265,7 @@ def test_counts_are_integers_for_any_budget(name):
 
 
 @every_method
-def test_dense_output_agrees_with_a_run_that_ends_there(name):
+def test_dense_output_in_mid_step_agrees_with_an_accurate_run_to_that_time(name):
     rtol = 1e-8
     method, _ = driven(name, rtol, 0.05 * PERIOD)
     out = np.zeros(4)

@@ -146,7 +146,7 @@ def test_method_has_order_five_on_a_curve_that_attracts_mildly():
     assert orders(curve_errors(-1.0)) == pytest.approx(5.0, abs=0.3)
 
 
-def test_stiff_attraction_to_a_curve_is_exact_to_rounding():
+def test_solution_on_a_stiffly_attracting_curve_is_exact_to_rounding():
     """The method is stiffly accurate: the error falls with the stiffness even for the longest step."""
     assert max(curve_errors(-1e12)) < 1e-13
 

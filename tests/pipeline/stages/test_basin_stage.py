@@ -156,7 +156,7 @@ def test_contact_model_needs_a_contact_block(tmp_path):
         run(tmp_path, "contact=null", "basin.model=contact")
 
 
-def test_walkers_with_more_coordinates_are_rejected(tmp_path):
+def test_walkers_with_more_than_three_coordinates_are_rejected(tmp_path):
     free = load(Path("kneed"), ["walker.knee.at_heel_strike=free"]).config
     inputs = {"fixedpoint": Content({}, GAIT)}
     with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):

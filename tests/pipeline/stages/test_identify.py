@@ -389,7 +389,7 @@ def test_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
     assert "--nuisance angle_offset_rad" in " ".join(" ".join(answer("identify", summary)).split())
 
 
-def test_sensitivity_of_the_identified_gait_has_an_error(table, gait):
+def test_sensitivity_of_the_identified_gait_has_a_standard_error(table, gait):
     fit = "identify.fit={slope_deg: null}"
     summary = identify.run(taken(*ask(table, fit, "identify.robustness=true")), gait, Silent()).summary
     norm = summary["gait"]["drop_sensitivity_s_m"]

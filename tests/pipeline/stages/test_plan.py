@@ -84,7 +84,7 @@ def test_nonpositive_error_is_rejected():
         configured("plan.errors={slope_deg: -1}")
 
 
-def test_identify_plans_without_data(tmp_path):
+def test_identify_with_the_option_plan_needs_no_data(tmp_path):
     options = ["--runs", str(tmp_path), "--fit", "slope_deg", "--set", "plan.steps=5", "--set", "plan.max_steps=5"]
     done = CliRunner().invoke(program(), ["identify", "--plan", *options, "--error", "slope_deg=0.05", "--json"])
     assert done.exit_code == 0, done.output

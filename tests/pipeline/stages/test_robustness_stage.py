@@ -186,7 +186,7 @@ def test_gradients_do_not_depend_on_the_number_of_processes(rigid):
     assert robustness.sensitivities(subject, keys, numbers, Silent(), jobs=2) == rigid.summary["sensitivity"]
 
 
-def test_unstable_gait_has_no_norm_but_other_results():
+def test_unstable_gait_has_no_sensitivity_norm_but_all_other_results_are_given():
     with pytest.raises(NoAnswer, match="the gait of the rigid model is unstable") as raised:
         run("rigid-only", "slope_deg=4.6", *FEW)
     summary = raised.value.partial.summary

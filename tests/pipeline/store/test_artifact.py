@@ -122,7 +122,7 @@ def test_root_arrays_open_as_one_dataset_and_keep_text_of_any_shape(tmp_path, id
         artifact.write(tmp_path / "a.h5", Content({"": Group({}, {"stage_key": "x"})}), identity, origin)
 
 
-def test_every_array_has_unit_name_and_dimension_scales(tmp_path, content, identity, origin):
+def test_every_array_has_a_unit_a_long_name_and_dimension_scales(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", content, identity, origin)
     with h5py.File(tmp_path / "a.h5") as file:
         for name, dataset in file["corrected/walk"].items():

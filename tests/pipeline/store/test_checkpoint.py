@@ -40,7 +40,7 @@ def test_checkpoint_lines_after_a_damaged_one_are_dropped(path):
 
 
 @pytest.mark.parametrize("forged", [b"\n", b"x\n", line(3), line(["a"]), line(["a", ["b"]]), line({"a": 1, "b": 2})])
-def test_checkpoint_line_that_is_not_a_part_is_dropped(path, forged):
+def test_malformed_checkpoint_line_is_dropped(path, forged):
     with path.open("ab") as file:
         file.write(forged)
     assert list(Checkpoint(path, "key").kept) == ["one", "two"]
@@ -56,7 +56,7 @@ def test_parts_of_another_key_are_kept_until_the_first_new_one(path):
     assert Checkpoint(path, "key").kept == {}
 
 
-def test_forgetting_a_checkpoint_deletes_its_file_and_later_parts_are_kept(path):
+def test_forgetting_a_checkpoint_deletes_its_file_but_new_parts_can_still_be_kept(path):
     checkpoint = Checkpoint(path, "key")
     checkpoint.forget()
     assert not path.exists()

@@ -47,7 +47,7 @@ def test_labelled_values_are_columns_with_unit_and_meaning():
     assert group["place_m"].tolist() == [[0.1, 0.2], [0.3, 0.4]]
 
 
-def test_missing_value_is_a_gap_or_the_substitute_of_its_label():
+def test_missing_value_becomes_a_gap_unless_its_label_defines_a_substitute():
     stored = columns(STONES, labels_of(Stone), "stone")
     np.testing.assert_array_equal(stored["depth_m"].values, [1.5, np.nan])
     assert stored["bounces"].values.tolist() == [2, 0]

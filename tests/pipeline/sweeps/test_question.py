@@ -23,7 +23,7 @@ def test_range_includes_both_ends():
     assert grid.places(4) == (1, 1)
 
 
-def test_options_and_powers_are_valid_values():
+def test_values_to_sweep_may_be_options_or_logarithmically_spaced():
     assert question("contact.terrain=[checkerboard, after-mid-swing]").axes[0].values[1] == "after-mid-swing"
     assert question("contact.stiffness=1e4:1e6:3:log").axes[0].values == pytest.approx((1e4, 1e5, 1e6), rel=1e-14)
 

@@ -244,7 +244,7 @@ def test_bad_points_are_reported_before_anything_runs(toy, marks):
     assert not toy.runs.exists()
 
 
-def test_stage_with_checkpoints_is_swept_without_its_file(toy):
+def test_sweep_of_a_stage_with_checkpoints_leaves_no_checkpoint_file(toy):
     swept = toy.run("count", "seed=[2, 3, 4]")
     assert swept.content[""]["total"].tolist() == [1.0, 3.0, 6.0]
     assert not list(toy.runs.rglob("*.parts"))

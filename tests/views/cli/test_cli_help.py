@@ -83,7 +83,7 @@ def test_help_states_the_purpose_of_each_command_in_full(walker):
 
 
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=lambda stage: stage.name)
-def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
+def test_every_stage_has_the_common_options_and_only_walking_stages_have_strides(walker, stage):
     words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())
     if stage.adds_command:
         assert {"--config", "--set", "--json", "--quiet", "--verbose"} <= words

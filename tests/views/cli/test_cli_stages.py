@@ -66,7 +66,7 @@ def test_warnings_are_printed_even_with_quiet(toy):
     assert done.stderr.startswith("warning: runs/paper/drop.h5 is damaged")
 
 
-def test_dry_run_explains_and_changes_nothing(toy):
+def test_dry_run_explains_its_plan_without_changing_anything(toy):
     done = toy("page", "--config", "rigid-only", "--dry-run")
     assert done.returncode == 0
     assert [line.split()[:2] for line in done.stdout.splitlines()[1:-1]] == [

@@ -246,7 +246,7 @@ def test_named_run_is_found_by_its_name(toy):
     assert run_dir(swept) == "runs/moons"
 
 
-def test_run_name_does_not_overwrite_results_of_another_change(toy):
+def test_named_run_is_not_overwritten_by_a_run_with_different_settings(toy):
     toy("drop", "--set", "gravity_m_s2=2", "--name", "moon")
     done = toy("drop", "--set", "gravity_m_s2=3", "--name", "moon")
     assert done.returncode == 3

@@ -109,7 +109,7 @@ def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
     assert b"/FontFile2" in data.replace(b" ", b"")
 
 
-def test_format_and_file_name_are_handled_consistently(run, tmp_path):
+def test_export_format_follows_the_file_name_and_must_not_contradict_it(run, tmp_path):
     assert export_from(run, "trajectory", Target(None, None), "simulate", QUIET).name == (
         "paper-simulate-trajectory.csv"
     )
@@ -217,7 +217,7 @@ def test_number_of_film_frames_follows_from_duration_and_rate(run, tmp_path):
 
 
 @pytest.mark.parametrize("rate", [24, 25, 30, 50])
-def test_gif_lasts_as_long_as_its_pictures_at_their_rate(rate):
+def test_duration_of_a_gif_is_its_number_of_frames_divided_by_the_frame_rate(rate):
     pictures = np.zeros((3 * rate, 4, 4, 3), np.uint8)
     pictures[np.arange(3 * rate), 0, 0] = np.arange(3 * rate)[:, None]
     with Image.open(io.BytesIO(gif(pictures, rate))) as film:

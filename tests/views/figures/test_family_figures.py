@@ -102,7 +102,7 @@ def test_captions_state_where_gaits_change():
     assert FIGURE_16.render(results).caption.startswith("Curves of flips of the rigid model's gaits")
 
 
-def test_plane_is_shaded_by_the_attractor_of_walks():
+def test_parameter_plane_is_shaded_by_the_attractor_at_each_point():
     regions = families()["continuation"]["rigid/regions"]
     kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
     assert kinds == {"1 step": 3, "2 steps": 1, "aperiodic": 1, "no walking": 1}

@@ -198,7 +198,7 @@ def test_captions_are_sentences_with_numbers(figure):
     assert "nan" not in caption
 
 
-def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
+def test_heel_strikes_of_both_models_are_marked_on_every_time_axis():
     results = both_models()
     expected = {
         RIGID_LOOK.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),

@@ -28,7 +28,7 @@ def rough():
     return {"robustness": stored("robustness", groups, {})}
 
 
-def test_share_still_walking_falls_at_failures_but_not_at_the_cut_off(rough):
+def test_fraction_still_walking_drops_at_failures_but_not_at_the_cut_off(rough):
     with figure_style():
         figure, _ = robustness.FIGURE_18.draw(rough)
     for walks, line in zip(STEPS[0], figure.axes[2].lines, strict=True):

@@ -68,7 +68,7 @@ def test_multipliers_are_written_as_complex_numbers():
     assert row(lines, "λ₃") == ["0.2160"]
 
 
-def test_answer_lists_drives_but_not_springs():
+def test_answer_mentions_a_spring_but_does_not_call_the_gait_driven_by_it():
     spring = {"driven_by": [], "springs": ["a hip spring of 10 N m/rad"]}
     head = said(answer("fixedpoint", {**GAIT, **spring}))
     assert ", with a hip spring of 10 N m/rad, there is a stable gait" in head
@@ -98,7 +98,7 @@ def test_misprint_without_effect_has_no_column():
     assert ["quantity", "value"] in cells(lines)
 
 
-def test_walker_with_more_angles_lists_them_by_name():
+def test_state_of_a_walker_with_three_angles_is_listed_by_name():
     gait = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2]}
     names = ["theta_1", "theta_2", "theta_1_shank", "dtheta_1", "dtheta_2", "dtheta_1_shank"]
     lines = answer("fixedpoint", {**gait, "state_names": names, "equation_sets": {"corrected": gait}})

@@ -346,7 +346,7 @@ def test_steps_of_both_models_are_shown_side_by_side():
     assert found["4"] == ["0.7000", "–", "0.3700", "–", "–"]
 
 
-def test_steps_are_printed_to_the_numerical_error():
+def test_steps_are_printed_with_as_many_digits_as_the_numerical_error_allows():
     error = {"step_period_s": 4e-6, "step_length_m": 4e-4, "end_time_s": 1e-5}
     section = sections(simulate=simulate(numerical_error=error), **{"contact-sim": contact_sim()})["steps"]
     assert rows(section)["2"][:4] == ["0.70000", "0.7000", "0.370", "0.3700"]
