@@ -91,7 +91,7 @@ def state_of(step: Step) -> str:
 
 
 def explain_states(steps: Sequence[Step]) -> Iterator[str]:
-    """Say why each stage's result has its state, or yield '' if that needs no explanation.
+    """Explain the state of each stage's result, or yield '' if that needs no explanation.
 
     If several stages have the same reason, all but the first refer to the first.
     """
