@@ -51,7 +51,7 @@ def outcome_of(label: str) -> Outcome | None:
 
 class OutcomeWords(NamedTuple):
     does: str  # what one walker does, in the present tense
-    did: str  # what a number of walks did, in the past tense
+    did: str  # what several walks did, in the past tense
     why: str  # reason why a family of gaits ends with this outcome
     colour: str  # colour on maps: saturated for walking, pale for failures
     advice: str  # meaning of the outcome, and what to try next

@@ -45,7 +45,7 @@ def test_each_row_has_type_bounds_default_meaning_and_source() -> None:
         assert all((row.type, row.bounds, row.default, row.meaning, row.source)), row
 
 
-def test_reference_states_bounds_and_units() -> None:
+def test_config_reference_lists_bounds_and_units() -> None:
     rows = {row.key: row for row in keys()}
     length = rows["walker.leg_length_m"]
     assert (length.unit, length.bounds, length.default) == ("m", "from 0.001 to 1000", "1")

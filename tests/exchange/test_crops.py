@@ -17,7 +17,7 @@ def campaign():
     return module
 
 
-def test_no_strike_of_a_cropped_recording_is_missed_invented_or_far_off(tmp_path):
+def test_all_strikes_of_a_cropped_recording_are_found_near_the_true_times(tmp_path):
     crops = campaign()
     rng = np.random.default_rng(3)
     counts = [crops.count_strikes(crops.draw(rng), rng, tmp_path) for _ in range(25)]

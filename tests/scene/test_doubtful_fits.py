@@ -326,7 +326,7 @@ def test_rate_jumps_at_strikes_are_estimated_with_valid_errors():
     assert values(kicked)[HIP].standard_error > 2.5 * values(even)[HIP].standard_error
 
 
-def test_errors_allow_for_every_disturbance_that_may_have_moved_the_walk():
+def test_error_bars_allow_for_every_likely_disturbance():
     result = identify(twenty_steps(), fit={"slope_deg": None, HIP: None})
     fitted = result.fitted
     noises = likely_noises(fitted)

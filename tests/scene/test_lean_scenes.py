@@ -216,7 +216,7 @@ def test_preview_lists_the_same_omissions_as_the_result(tmp_path, sets):
     ("name", "sets", "angles"),
     [("paper", (), 2), ("torso", (), 3), ("kneed", (), 3), ("kneed", ("walker.knee.lock=compliant",), 4)],
 )
-def test_pinned_step_is_integrated_in_as_many_angles_as_can_change(name, sets, angles):
+def test_pinned_step_integrates_only_the_angles_that_can_change(name, sets, angles):
     config = load(Path(name), (*sets, "contact.stance=pinned")).config
     scene = contact_scene(config, 0.4)
     # The stance knee is locked, so a kneed walker has one body less.

@@ -93,7 +93,7 @@ class FollowingValue(NamedTuple):
 def align_start(config: schema.Config, tree: BlockNode) -> tuple[schema.Config, tuple[str, ...]]:
     """Compute the values of the start that follow from others, and describe how much stated values had to be changed.
 
-    Raises ConfigError with a position for a missing value that does not follow, or a stated value that is far off.
+    Raises ConfigError, with the position in the file, if a missing value cannot be computed or a stated one is far off.
     """
     if isinstance(config.start, str):
         return config, ()

@@ -108,7 +108,7 @@ def add_stops(config: "Config") -> "Config":
 
 
 def parts_left_out(export: exported.Exported, config: "Config", kind: Kind, law: Law, script: str) -> Iterator[str]:
-    """Describe the parts of the walk of a config that an exported model lacks or replaces."""
+    """Describe what an exported model leaves out of a config's walk, or replaces."""
     by_functions = kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:
         yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"

@@ -109,7 +109,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
         raw = walk.quantities[name]
         if (largest := float(np.percentile(np.abs(raw), FAR_PERCENT))) > 2.0 * math.pi:
             raise ConfigError(
-                f"{source}: {name} from the vertical reaches {largest:.3g} rad, more than a turn.",
+                f"{source}: {name} from the vertical reaches {largest:.3g} rad, more than a full turn.",
                 "State the unit of angles, e.g. --units angle=deg, or remove outliers.",
             )
         angle = np.unwrap(raw)
@@ -267,7 +267,7 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Stretch of samples of a leg that lies on a smooth curve if a constant is subtracted."""
+    """Successive samples of a leg that lie on a smooth curve once a constant is subtracted."""
 
     leg: int
     first: int

@@ -189,7 +189,7 @@ def stated_direction(walks: str, up: Array) -> Array:
     away = np.cross(upwards, right)
     direction = {"right": right, "left": -right, "away": away, "towards": -away}[walks]
     if np.any(direction[up.size :]):
-        raise ConfigError(f"walks: {walks}, but the markers have no depth.", "State left or right.")
+        raise ConfigError(f"walks: {walks}, but the markers have no depth.", "Use left or right.")
     return np.asarray(direction[: up.size])
 
 

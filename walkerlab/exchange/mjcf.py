@@ -46,7 +46,7 @@ DAMPED_STEP = 0.33
 """Maximum time step as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
-"""Settings that make couplings and locks as stiff as constraints in MuJoCo can be with time steps of STEP_S."""
+"""Settings that make couplings and locks as stiff as MuJoCo allows with time steps of STEP_S."""
 TIGHT_SOLVER = 'iterations="100" tolerance="1e-12"'
 
 

@@ -76,7 +76,7 @@ UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s
 """Pattern for a unit in brackets after a name. It excludes [2] and [:,2], which are indices of vector components."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
-"""Texts, in lower case, of cells that have no value."""
+"""Texts of cells, in lower case, that stand for a missing value."""
 THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
 COMMAS_AND_BLANKS: Final = re.compile(r" *[-+]?\d+,\d+(?: +[-+]?\d+,\d+(?:[eE][-+]?\d+)?)+ *")

@@ -91,7 +91,7 @@ MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of 
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over which walks count as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
-PROMISING_GAIN: Final = 2.0  # a new fit is tried if the log-likelihood gains at least this with unchanged noise
+PROMISING_GAIN: Final = 2.0  # fit again if, at unchanged noise, the log-likelihood gains at least this
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
 # Estimates agree with the config if its values lower the log-likelihood by less than this (two standard errors).
 NEAR_CONFIG: Final = 2.0

@@ -88,7 +88,7 @@ def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Build the error for a config key `where` that names a parameter `key` which none of the models uses."""
+    """Build the error for the config key `where`, whose parameter `key` none of the models uses."""
     text = f"{where}: {key} does not affect the {' or the '.join(models)} model"
     advice = "Choose a key that the model uses, or another model (--model)."
     return ConfigError(text, advice, tuple(where.split(".")))

@@ -35,7 +35,7 @@ def small(config, *sets, cells=3):
     return tuned(config, f"tune.cells={cells}", "tune.rigid_limit=false", *sets)
 
 
-def test_contact_of_the_paper_needs_no_adjustment():
+def test_contact_walk_of_the_paper_needs_no_adjusted_start():
     found = small("paper").summary["adjustment"]
     assert not found["needed"]
     assert (found["scale_dtheta1"], found["scale_dtheta2"], found["walked_steps"]) == (1.0, 1.0, 10)

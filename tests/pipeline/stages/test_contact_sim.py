@@ -171,7 +171,7 @@ def test_ground_carries_the_walker_and_never_pulls(paper):
     assert trajectory["penetration_m"].max() <= paper.summary["max_penetration_m"] * (1.0 + 1e-9)
 
 
-def test_variables_of_equal_name_have_equal_meaning_in_both_models(paper):
+def test_variables_with_the_same_name_mean_the_same_in_both_models(paper):
     rigid = simulate.run(restrict(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
     for group, expected in SHARED.items():
         ours, theirs = (walk[group].variables for walk in (paper, rigid))

@@ -154,7 +154,7 @@ def test_parameters_are_ranked_over_both_models(both):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_large_means_are_printed_to_significant_digits(rigid):
+def test_large_means_are_rounded_to_significant_digits(rigid):
     one = rigid.summary["rough_ground"][0] | {"mean_steps": 492652.3, "standard_error": 348357.1, "method": "censored"}
     assert "takes 490,000 ± 350,000 steps on average before falling." in said_of(
         {**rigid.summary, "rough_ground": [one]}

@@ -65,7 +65,7 @@ def test_row_of_a_sweep_equals_the_result_of_its_config(toy):
     assert set(swept.content[""]["outcome"].ravel()) == {"walked"}
 
 
-def test_points_without_an_answer_have_rows_with_the_reason(toy):
+def test_rows_of_failed_points_state_the_reason(toy):
     swept = toy.run("drop", "slope_rad=[0.1, 0.35, 1.2]")
     assert (swept.summary["done"], swept.failed) == (3, 0)
     with opened(swept) as dataset:

@@ -64,7 +64,7 @@ SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 DIFFERENCE = 1e-6
 MAX_MOVES = 16  # iterations of Newton's method
 SMALLEST_MOVE = 1e-13  # a gait that moves by less over a step is accepted at once
-MAX_RESIDUAL = 1e-11  # largest residual of a gait if rounding prevents further progress
+MAX_RESIDUAL = 1e-11  # a gait may have this residual if rounding prevents further progress
 SLOW_RATIO = 0.1  # if the error shrinks by less than this factor, the derivative is computed again
 
 
@@ -209,7 +209,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
-    """A step of a walker, which is a gait or a first guess of one."""
+    """A step that is a gait of the walker, or a first guess of one."""
 
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike

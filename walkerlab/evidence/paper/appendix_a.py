@@ -119,7 +119,7 @@ def assembled(walker: RigidWalker) -> RigidModel:
 def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
     """Return a config's passive compass as a walker of Appendix A.
 
-    Raises ValueError for another walker.
+    Raises ValueError for any other walker.
     """
     walker = config.walker
     if not isinstance(walker, CompassWalker) or walker.torso is not None:

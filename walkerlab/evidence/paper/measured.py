@@ -161,7 +161,7 @@ class Measured:
 
     walker: RigidWalker
     equations: str
-    models: Mapping[str, RigidMeasurements]  # by set of equations, without sets that have no gait
+    models: Mapping[str, RigidMeasurements]  # by set of equations; sets without a gait are left out
     spectral_radii: Mapping[str, float]  # spectral radii of these gaits, by set of equations
     contact: ContactMeasurements
     errors: Errors

@@ -33,7 +33,7 @@ verdict depends only on printed values.
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
-    """Count values by verdict. Until 0.3 is released, `refuted` repeats the sum of the last two."""
+    """Count values by verdict. Until 0.3 is released, `refuted` also gives the sum of the last two."""
     verdicts = Counter(row.verdict for row in rows)
     return {
         **{verdict.value: verdicts[verdict] for verdict in VERDICTS},

@@ -300,9 +300,9 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Simulate a walk with other methods until one of them has an answer.
+    """Simulate a walk with other methods until one of them gives an answer.
 
-    budget  limit on right-hand sides, which may be lower for libraries
+    budget  maximum number of right-hand sides; methods of libraries may get fewer
     walk    function that simulates the walk with a method and a budget
     """
     tried: list[str] = []

@@ -104,9 +104,9 @@ def scale_covariance(covariance: Floats, scales: Floats) -> dict[str, Any]:
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Reduce the information `whole` (unknowns, unknowns) to that on the parameters, which are its first rows.
+    """Reduce the information matrix `whole` (unknowns, unknowns) to that of the parameters, which come first.
 
-    The other unknowns are free, and noise levels count as known.
+    The other unknowns are estimated as well, and noise levels count as known.
 
     values  number of measured values
     """

@@ -92,7 +92,7 @@ def describe_limp(fitted: Fitted) -> str:
 
 
 def alternations(fitted: Fitted, residuals: Floats) -> dict[str, float]:
-    """Return, by quantity of a step, how much the residuals of odd and even steps differ, in standard deviations."""
+    """Return by how many standard deviations the residuals of odd and even steps differ, for each step quantity."""
     steps = fitted.forecast.measured.count
     channels = enumerate(fitted.forecast.channels)
     return {quantity: alternation_of(residuals[index * steps : (index + 1) * steps]) for index, quantity in channels}

@@ -238,7 +238,10 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Record the energy account and the springs' work at the end of a step, for the work in completed steps."""
+    """Record the energy account and the work of the springs at the end of a step.
+
+    Those at the last heel strike give the work in completed steps.
+    """
     for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.tally.spring_work = observer.tally.start_spring - hinge_energies(system, y)[0]

@@ -276,7 +276,7 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
 
 
 def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
-    """Return the point in the frame of `body` where it is hinged to `other`, or the origin without such a hinge."""
+    """Return the point in the frame of `body` where it is hinged to `other`, or the origin if there is none."""
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 

@@ -237,7 +237,7 @@ class RigidStepper(local):
     def differentiate(
         self, section: StrikeSection, start: Floats, floor: tuple[Floats, float], times: Floats
     ) -> StepTangents | None:
-        """Differentiate a step with respect to its start (2 n,) and its foothold's rise. Return None if it fails.
+        """Differentiate a step with respect to its start (2 n,) and its foothold's rise, or return None if it fails.
 
         floor  rises (2,) and nearest landing, as in `HeelStrikes`
         times  (times,) times of samples, from the start of the step

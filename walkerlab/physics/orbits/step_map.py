@@ -65,7 +65,7 @@ class Iterates:
 
 @dataclass(frozen=True)
 class DisturbedWalk:
-    """A walk from the section over uneven ground, or after a push."""
+    """A walk that starts on the section, over uneven ground or after a push."""
 
     outcome: Outcome  # WALKED if every step was completed
     durations_s: Floats  # (steps,) times between heel strikes

@@ -14,7 +14,7 @@ from walkerlab.pipeline.store.runs import SHOWN_CHANGES, RunFolder, config_text,
 
 SUFFIX = ".h5"
 BUILTIN = "built-in "
-"""Prefix of the source of a run with a built-in config."""
+"""Prefix that marks the source of a run as a built-in config."""
 
 
 @dataclass(frozen=True)

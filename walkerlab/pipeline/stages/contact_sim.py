@@ -58,8 +58,8 @@ def warn_of_unresolved_slip(atol: float, scene: contact.ContactScene, progress: 
     rising = scene.walker.friction.rising_until
     if atol > MAX_TOLERANCE_RATIO * rising:
         progress.note(
-            f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large relative to contact.stiction_velocity "
-            f"({rising:g} m/s), up to which friction rises, so friction and the outcome may be due to chance"
+            f"contact-sim: lower solver.contact.atol ({atol:g} m/s). It is large relative to contact.stiction_velocity "
+            f"({rising:g} m/s), so errors of the solver may decide the friction, and with it the outcome"
         )
 
 

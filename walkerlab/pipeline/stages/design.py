@@ -260,7 +260,7 @@ class Gaits:
         }
 
     def robustness_at(self, x: Floats) -> dict[str, float]:
-        """Return the quantities of `ROBUSTNESS` at parameter values with a gait, or nothing if the gait is unstable."""
+        """Return the quantities of `ROBUSTNESS` for the gait at parameter values x, or nothing if it is unstable."""
         config = config_with(self.config, self.parameters, x.tolist())
         assert config is not None, "a walker with a gait is valid"
         subject = ModelUnderTest(self.model, config, self.sections[x.tobytes()], self.length)

@@ -135,7 +135,7 @@ def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
 
 
 def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
-    """Yield candidates for the sum of the leg angles at heel strike (rad, from the slope's normal), first 0."""
+    """Yield candidates for the sum of the leg angles at heel strike (rad, from the slope's normal), starting with 0."""
     yield 0.0
     if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return

@@ -121,7 +121,7 @@ QUESTIONS = (
     ),
     Stage(
         "plan", "walkerlab.pipeline.stages.plan",
-        "Find which measurements, and how many steps, it takes to determine the walker's parameters.",
+        "Find out which measurements, and how many steps, determine the walker's parameters.",
         reads.PlanConfig, results_of("fixedpoint"), only_by="plan", shown_by=DRAWINGS,
         options=(
             *ESTIMATED, ERRORS_TO_REACH,

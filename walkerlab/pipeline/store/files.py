@@ -43,7 +43,7 @@ ADVICE = {
 
 @contextlib.contextmanager
 def storing(path: Path) -> Iterator[None]:
-    """Convert an OSError that is raised while `path` is stored to StorageError."""
+    """Turn an OSError that is raised while storing `path` into a StorageError."""
     try:
         yield
     except OSError as error:

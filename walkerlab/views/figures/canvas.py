@@ -30,8 +30,8 @@ HEIGHT_EXPONENT = 0.7
 """Power of a figure's width to which its height is proportional. It is below 1, because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Ratios of an axis's limits, each with multiples of powers of ten that are labelled, too, if the limits have a smaller
-ratio."""
+"""Labels between the powers of ten on a short axis: (6, (2, 3, 5)) also labels 2, 3 and 5 times each power if the upper
+limit is less than 6 times the lower one."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_PLAIN_NUMBER: Final = 1e4
 """Largest number that labels show without an exponent."""

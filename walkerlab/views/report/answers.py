@@ -42,7 +42,7 @@ def answer(stage: str, summary: Summary) -> list[str]:
 
 def answer_html(stage: str, summary: Summary) -> str:
     """Return the answer as HTML. If the stage is not in `ANSWERS`, show its lines as they are."""
-    # Imported here, because terminals need no templates.
+    # Imported here, because answers in a terminal need no templates.
     from walkerlab.views.report.page import environment, to_markup
 
     if stage not in ANSWERS:

@@ -71,7 +71,7 @@ def step_value(place: int, key: str, gait: Mapping[str, Any]) -> float:
 
 
 def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield table lines for period and length of each of the two steps of a gait, and for the asymmetry of both."""
+    """Yield table lines for the periods and lengths of a gait's two steps, and for their asymmetries."""
     for index, leg in enumerate(("leg 1", "leg 2")):
         for name, key in (("period", "period_s"), ("length", "length_m")):
             title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))

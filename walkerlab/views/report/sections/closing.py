@@ -94,7 +94,7 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """For each reason, yield a row with the results that it affects and, if other results need these, a row with those.
+    """For each reason, yield a row with the results that it affects. If others need these, a second row has them.
 
     A row has the results, the reason, and what leaving them out saves.
     """

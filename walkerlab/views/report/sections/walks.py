@@ -51,7 +51,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
 
 
 def joules(value: float, digits: int = 4) -> str:
-    """Format an energy (J), which may be nothing but rounding."""
+    """Format an energy (J). Below 1 mJ it may be only rounding error, so it is shown as a power of ten."""
     return f"{numbers.number(value, digits) if abs(value) >= 1e-3 or value == 0 else numbers.power_of_ten(value, 2)} J"
 
 
