@@ -77,7 +77,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     """Find the samples (samples,) at which two points are exchanged. They are at most half of all samples.
 
     Exchanges are chosen so that both points move as evenly as possible from sample to sample. An exchange counts only
-    if it makes the motion more even than fast motion or scatter could explain.
+    if the motion becomes more even by more than fast motion or scatter could cause.
 
     apart  (samples, axes) difference of the two points
     """

@@ -259,7 +259,7 @@ def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
-    """Return the longest sequence of heel strikes of alternate legs. Also return doubts if others are dropped."""
+    """Return the longest sequence of heel strikes of alternate legs, and doubts that describe dropped strikes."""
     walks: list[list[Touch]] = [[]]
     breaks = []
     for touch in touches:
