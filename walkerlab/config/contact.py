@@ -55,7 +55,10 @@ class Contact(Block):
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
     )
     friction: Literal[words("friction")] = key(  # type: ignore[valid-type]
-        "coulomb", "", "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground", _FRICTION
+        "coulomb",
+        "",
+        "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground; extensions add others",
+        _FRICTION,
     )
     static_friction: float = key(
         0.9, "1", "coefficient at stiction_velocity, where friction is largest", _SECTION_4, ge=0.0, le=100.0

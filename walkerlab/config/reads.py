@@ -36,7 +36,8 @@ def keys_of(takes: type) -> dict[str, type | None]:
 
 def _part(member: property) -> type | None:
     getter: Any = member.fget
-    result_type = getter.__globals__.get(getter.__annotations__.get("return"))
+    annotation = getter.__annotations__.get("return")  # a name if the module postpones annotations
+    result_type = getter.__globals__.get(annotation, annotation)
     # A type that is not a Protocol is a config block, which is read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 

@@ -76,7 +76,7 @@ def rigid_walker(config: reads.RigidConfig, equations: "Equations | None" = None
 
 
 def add_drives(passive: RigidModel, config: reads.RigidConfig) -> RigidModel:
-    """Return the model with the push-off, hip spring and knee dampers of the config."""
+    """Return the model with the push-off, the hip's spring, damper and torque, and the knee dampers of the config."""
     drives = parts.drive_parameters(config)
     driven = passive.changed(**drives.shared)
     legs = [
