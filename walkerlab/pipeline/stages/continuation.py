@@ -134,7 +134,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models whose gaits are to be followed.
 
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
-    of a span is invalid, the second key equals the first, or its range does not contain its value in the config.
+    of a span is invalid, the second key equals the first, or the second key's range excludes its value in the config.
     """
     config = question.config
     second = question.second

@@ -242,8 +242,8 @@ class Gaits:
     ) -> dict[str, float]:
         """Differentiate the largest disturbances with respect to a parameter.
 
-        The gaits are at values `gap` below and above. If there is no gait on one side, the difference from the gait in
-        the middle is used.
+        The difference is between gaits at values `gap` below and above. If there is no gait on one side, the gait in
+        the middle takes its place.
         """
         if not self.largest:
             return {}
