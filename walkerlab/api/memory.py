@@ -222,7 +222,7 @@ def continue_gait(
     slope_deg: float | None = None,
     **keys: Setting,
 ) -> Result:
-    """Follow families of gaits over a config parameter, in memory.
+    """Follow families of gaits as a config parameter varies, in memory.
 
     walker     built by `compass`, `kneed` or `walker`
     over       config key to vary

@@ -210,7 +210,7 @@ def test_missing_derivative_is_a_gap():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        (("robustness.roughness_m=[0.7]",), "more than half a leg"),
+        (("robustness.roughness_m=[0.7]",), "more than half the leg length"),
         (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
         (("robustness.to=[strides]",), "affects no model"),
         (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not affect the rigid model"),
