@@ -71,10 +71,11 @@ def contact_scene(
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     laws = ground_laws(contact)
+    rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
     drives = contact_drives(config)
-    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, knee_rules(config.walker), drives=drives)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
     leg = config.walker.leg_length_m
     frame = contact_state.Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = contact_state.JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -114,11 +115,12 @@ def scene_on_pads(
 
 
 def contact_drives(config: reads.ContactConfig) -> ContactDrives:
+    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(hinge_law_of(config.walker), fields)
+    return ContactDrives(law, fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:

@@ -16,7 +16,7 @@ import numpy as np
 from walkerlab.physics.ground.normal_force import smooth_step
 from walkerlab.physics.kernels import LawKind, dispatch_by_type, dispatch_by_type_or_default
 
-SLOPE_SAMPLES = 101  # number of slip velocities in the rising part of the coefficient, and in the falling part
+SLOPE_SAMPLES = 101  # number of slip velocities sampled in each part of the friction coefficient, rising and falling
 
 
 class FrictionLaw(Protocol):
