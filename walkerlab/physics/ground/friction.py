@@ -2,8 +2,8 @@
 
 A law is a class that holds the law's parameters and has the members of `FrictionLaw`. It needs a case of
 `friction_coefficient` and, if its coefficient has several formulas, cases of `switching_count` and `sample_switching`.
-`FRICTION_LAWS` lists the built-in laws by name, and the `Extension` of a package lists its laws. No other file depends
-on the choice of law.
+`FRICTION_LAWS` lists the built-in laws by name, and the `Extension` of a package lists its laws. Apart from the export
+for ADAMS, which refuses the laws of packages, no other file depends on the choice of law.
 """
 
 from __future__ import annotations
