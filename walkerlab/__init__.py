@@ -16,7 +16,7 @@ EXTENSIONS = {
     "questions": ".pipeline.stages.table:ASKING",
     "drawings": ".views.report.extension:EXTENSION",
 }
-"""Built-in extensions (see extensions.py), in the order of their stages. Other packages announce theirs."""
+"""Built-in extensions (see extensions.py), in the order of their stages. Other packages register entry points."""
 
 
 def __getattr__(name: str) -> Any:

@@ -63,7 +63,7 @@ class Sources:
         return [modules[name] for name in sorted(modules)]
 
     def module(self, name: str) -> "Module | None":
-        """Return the module with a full name, or None if it has no file."""
+        """Return the module that has this full name, or None if it has no file."""
         if name not in self._modules:
             self._modules[name] = self._find(name)
         return self._modules[name]
@@ -127,7 +127,7 @@ def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
 
 
 def absolute_name(module: str, is_package: bool, origin: str) -> str:
-    """Return the full name of the module that `from ... import` names, which may be relative to `module`."""
+    """Return the full name of the module that `from ... import` names. A relative name starts from `module`."""
     name = origin.lstrip(".")
     levels = len(origin) - len(name)
     if not levels:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 COMMAND_PATTERN: Final = re.compile(
     r"`(walkerlab (?!schema|open|init)([a-z-]+)(?: [A-Za-z0-9-]+)*?)(?: --set ([\w.]+)=([\w.+-]+))?`"
 )
-"""Pattern for commands in a message that act on a run, with at most one `--set`."""
+"""Pattern for commands that act on a run, as quoted in messages, with at most one `--set`."""
 
 SLOPES: Final = ("slope_rad", "slope_deg")
 
@@ -51,8 +51,8 @@ def escape_controls(text: str) -> str:
 
 
 class WalkerlabError(Exception):
-    """Failure that the user can act on. The message says what happened, and `advice`, which may be empty, what to
-    do."""
+    """Failure that the user can act on. The message says what happened. `advice` says what to do. It may be
+    empty."""
 
     exit_code: ClassVar[int] = 1
 

@@ -1,6 +1,6 @@
 """Extensions: packages that add stages, figures, sections of the page, answers, laws and studies.
 
-The built-in extensions are listed in `walkerlab.EXTENSIONS`. Other packages announce theirs by entry points of the
+The built-in extensions are listed in `walkerlab.EXTENSIONS`. Other packages register theirs through entry points in the
 group `walkerlab.extensions`. An extension names its code in quotes, "module:name", which is imported on first use. All
 other modules learn from this one what extensions add, so that no module has to name one of a higher layer.
 """
@@ -65,9 +65,10 @@ class Extension:
     answers: Mapping[str, str] = field(default_factory=dict)  # functions that print a stage's answer, by stage
     tables: Mapping[str, str] = field(default_factory=dict)  # tables of a stage's summary for export, by stage
     walkers: Mapping[str, str] = field(default_factory=dict)  # types of walkers, by word
-    normal_force: Mapping[str, str] = field(default_factory=dict)  # classes of normal-force laws, by word
-    friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by word
-    hinge_law: Mapping[str, str] = field(default_factory=dict)  # classes of hinge laws, by word
+    # classes of normal-force laws, by the word in a config
+    normal_force: Mapping[str, str] = field(default_factory=dict)
+    friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by the word in a config
+    hinge_law: Mapping[str, str] = field(default_factory=dict)  # classes of hinge laws, by the word in a config
     studies: Sequence[Study] = ()
 
     def words(self, key: str) -> Mapping[str, str]:
@@ -77,7 +78,7 @@ class Extension:
         return dict(getattr(self, key))
 
     def code(self) -> Iterator[str]:
-        """Yield all code that the extension names."""
+        """Yield all code that the extension registers, in the form `module:name`."""
         yield from self.drawing_code()
         yield from (code for key in WORDS for code in self.words(key).values())
         yield from (study.own_walker for study in self.studies)
@@ -185,7 +186,7 @@ def words(key: str) -> tuple[str, ...]:
 
 
 def external_extensions() -> tuple[Found, ...]:
-    """Return the extensions of other packages, including those that are left out."""
+    """Return the extensions of other packages, including those that are not used."""
     return tuple(found for found in registry() if found.source)
 
 

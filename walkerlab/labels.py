@@ -1,4 +1,4 @@
-"""Unit and meaning of a result's columns, declared next to the fields that hold their values."""
+"""Units and meanings of result columns, declared next to the fields that hold their values."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -45,7 +45,7 @@ class Outcome(IntEnum):
 
 
 def outcome_of(label: str) -> Outcome | None:
-    """Return the outcome with a label, or None if it is unknown."""
+    """Return the outcome with this label, or None if the label is unknown."""
     return next((outcome for outcome in Outcome if outcome.label == label), None)
 
 

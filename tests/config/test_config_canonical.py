@@ -137,3 +137,23 @@ def test_slice_has_only_the_keys_of_its_type(key: str) -> None:
         given = getattr(given, block)
     with pytest.raises(AttributeError, match=name):
         getattr(given, name)
+
+
+def test_part_of_a_block_is_read_in_part_whether_or_not_annotations_are_postponed() -> None:
+    module = """
+from typing import Protocol
+
+class Pads(Protocol):
+    @property
+    def terrain(self) -> str: ...
+
+class Own(Protocol):
+    @property
+    def slope_rad(self) -> float: ...
+    @property
+    def contact(self) -> Pads: ...
+"""
+    for first_line in ("", "from __future__ import annotations"):
+        names: dict[str, type] = {}
+        exec(compile(first_line + module, "own", "exec", dont_inherit=True), names)
+        assert tuple(reads.dotted_keys(names["Own"])) == ("slope_rad", "contact.terrain")

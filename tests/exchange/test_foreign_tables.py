@@ -306,7 +306,7 @@ def test_values_beyond_the_last_marker_are_rejected(tmp_path):
 
 def test_empty_marker_unit_in_the_header_is_ignored(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.trc", trc(units=""), LINES))
-    with pytest.raises(ConfigError, match=r"states no unit for 'HIP\.x'"):
+    with pytest.raises(ConfigError, match=r"gives no unit for 'HIP\.x'"):
         read(tmp_path, "walk.trc", trc(units=""), {**LINES, "hip_along_m": "HIP.x"})
 
 
@@ -353,7 +353,7 @@ def test_motion_file_angles_default_to_the_unit_opensim_assumes(name, settings, 
 def test_motion_file_without_version_and_degrees_needs_a_unit(tmp_path):
     """OpenSim reads such a file in degrees, whatever its header says."""
     text = opensim(settings="inDegrees=no\n")
-    with pytest.raises(ConfigError, match="states no unit for 'angle_1'"):
+    with pytest.raises(ConfigError, match="gives no unit for 'angle_1'"):
         read(tmp_path, "walk.mot", text)
     assert holds_the_walk(read(tmp_path, "walk.mot", text, units={"angle": "rad"}))
 
@@ -501,6 +501,6 @@ def test_circular_links_are_rejected(tmp_path):
 def test_file_of_markers_is_refused_unless_the_markers_of_a_leg_are_named(tmp_path):
     path = tmp_path / "markers.csv"
     path.write_text("time (s),PELVIS.x,PELVIS.y,HEEL.x,HEEL.y\n0,0,1,0,0\n0.01,0,1,0,0\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match="has no column for 'angle 1', but markers: PELVIS, HEEL") as refused:
+    with pytest.raises(ConfigError, match="has no column for 'angle 1', but it has markers: PELVIS, HEEL") as refused:
         walkerlab.read_walk(path)
     assert refused.value.advice.endswith('--columns "angle 1=HIP>FOOT"')

@@ -231,7 +231,7 @@ def test_unknown_column_or_unit_is_named(columns, units, message, advice, tmp_pa
 
 def test_missing_unit_is_requested(tmp_path):
     recording = read_recording(written(tmp_path, "walk.csv", OWN.replace("angle 2 (rad)", "angle 2")))
-    with pytest.raises(ConfigError, match="states no unit for 'angle 2'") as caught:
+    with pytest.raises(ConfigError, match="gives no unit for 'angle 2'") as caught:
         as_walk(recording, Recorded())
     assert "--units angle=rad" in caught.value.advice
     assert as_walk(recording, Recorded(units=parse_units(["rad"]))).both_legs("angle") == pytest.approx(ANGLES)

@@ -73,7 +73,7 @@ def test_constant_offset_without_an_angle_unit_is_refused(source, message, tmp_p
 
 def test_angles_from_the_horizontal_are_refused_with_the_option_that_turns_them(tmp_path):
     time, angle = sampled()
-    with pytest.raises(ConfigError, match=r"lies around -8[89] degrees") as refused:
+    with pytest.raises(ConfigError, match=r"is about -8[89] degrees") as refused:
         read(tmp_path, time, np.degrees(angle) - 90.0, "time (s),right thigh (deg),angle 2 (deg)",
              columns={"angle 1": "right thigh"})  # fmt: skip
     assert refused.value.advice.endswith('--columns "angle 1=right thigh+90deg".')

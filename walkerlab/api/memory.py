@@ -1,4 +1,4 @@
-"""Walkers and grounds built in Python, stages computed in memory, without files, and models for other programs."""
+"""Build walkers and grounds in Python, compute stages in memory without files, and make models for other programs."""
 
 import inspect
 import tempfile
@@ -93,7 +93,7 @@ class ContactKeys(TypedDict, total=False):
 
 
 def show_keys(function: F) -> F:
-    """Show the names of the TypedDict of a function's `keys` as parameters, so that notebooks complete them."""
+    """Show the keys in the TypedDict of a function's `**keys` as parameters, so that notebooks complete them."""
     (keys,) = get_args(inspect.get_annotations(function)["keys"])
     named = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None) for key in keys.__annotations__]
     vars(function)["__signature__"] = inspect.signature(function).replace(parameters=named)
@@ -222,7 +222,7 @@ def continue_gait(
     slope_deg: float | None = None,
     **keys: Setting,
 ) -> Result:
-    """Follow families of gaits over a config parameter, in memory.
+    """Follow families of gaits as a config parameter varies, in memory.
 
     walker     built by `compass`, `kneed` or `walker`
     over       config key to vary
@@ -379,7 +379,7 @@ def check(
 
     config   the walker: a Config, a config file or built-in name, or a run
     printed  values by name, such as {"period_s": "0.60"}; None keeps those of the config's block `check`. Give strings,
-             because the number of digits counts
+             because the number of digits matters
     keys     other keys of the block `check`, such as angles, instant, state_before
 
     Returns a result whose `summary["values"]` has a verdict for each value, and whose `explanations` say why values
@@ -561,7 +561,8 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
         if not isinstance(scene[name], kinds):
             raise ConfigError(f"{name}: {scene[name]!r} is not a {name} block.", makers)
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
-    # The paper is not the source of another scene, and keys of its walker would be merged into those of another type.
+    # A scene with other values does not come from the paper, so drop its `source`. Keys of the paper's walker would be
+    # merged into those of another type.
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = loader.tree_of(lines, NOWHERE)
     tree = merge_layers([*(layer.copy_without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
@@ -599,7 +600,7 @@ def two_numbers(name: str, values: Setting) -> Sequence[Setting]:
 
 
 def config_of_gait(gait: Gait) -> schema.Config:
-    """Return the config of a gait: of its run or, if it was found in memory, of its walker on the paper's ground."""
+    """Return the config of the gait's run. For a gait found in memory, use its walker on the paper's ground."""
     if gait.artifact is not None:
         return Run(RunFolder.open_folder(gait.artifact.parent)).config
     identity = cast(Identified, gait.content).identity
@@ -615,7 +616,7 @@ def identity_of_gait(config: schema.Config) -> Identity:
 def export_texts(
     config: schema.Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
 ) -> dict[str, str]:
-    """Return the texts of the files of a model by name. If `gait` is None, the gait is found first."""
+    """Return the text of each file of a model by file name. If `gait` is None, find the gait first."""
     from walkerlab.exchange import export
     from walkerlab.exchange.exported import GaitStart
     from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry

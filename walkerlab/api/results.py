@@ -279,7 +279,7 @@ def dataframe(group: Group) -> "DataFrame":
 
 
 def optional_module(name: str, what: str, title: str = "") -> ModuleType:
-    """Import the module `name` (in messages `title`), without which `what` cannot be made.
+    """Import the module `name`, which `what` needs. Messages call the module `title`.
 
     Raises ConfigError if it is not installed.
     """

@@ -29,7 +29,7 @@ class Combined(TypedDict, total=False):
     """Options for combining the values of a sweep's parameters. By default they form the full grid.
 
     zip     whether to combine the n-th values into the n-th point
-    sample  how to draw points from the intervals, and how many, instead of using the grid, such as "sobol:64"
+    sample  how many points to draw from the intervals, and how (such as "sobol:64"), instead of using the grid
     seed    seed of the sampled points; by default from the config
     """
 
@@ -226,7 +226,7 @@ def sweep(
 def warn(messages: Iterable[str], inside: int = 0) -> None:
     """Issue warnings that point at the line that called the API.
 
-    inside  number of functions of the API between the one that the user called and the one that calls this one
+    inside  number of API functions between the user's code and the caller of `warn`
     """
     for text in messages:
         warnings.warn(text, stacklevel=3 + inside)

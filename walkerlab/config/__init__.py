@@ -1,1 +1,1 @@
-"""Config: schema, loader with positions, layers, reference."""
+"""Config schema, a loader that keeps track of positions, the layers of a config, and the reference of its keys."""

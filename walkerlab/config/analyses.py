@@ -53,9 +53,9 @@ class Basin(Block):
         default_in_words=f"above {_WIDTH}",
     )
     refine: int = key(
-        4, "1", "parts into which cells at basin boundaries are divided along each axis; 1 for none", ge=1, le=32
+        4, "1", "parts per axis into which cells at basin boundaries are divided; 1 leaves them whole", ge=1, le=32
     )
-    steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
+    steps: int = key(300, "1", "number of steps in which a rigid walk must reach an attractor", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
 
     _plane = check_value("plane", why=why_no_plane)
@@ -84,7 +84,7 @@ if TYPE_CHECKING:
         """Declaration of the key `from`."""
 
 else:
-    # `from` is a keyword of Python, so a class body cannot declare a key of this name.
+    # `from` is a Python keyword, so a class body cannot declare a key of this name.
     _FROM = key(1.0e-4, _UNIT, "start of the range", bounds="a number below `to`")
     _Span = create_model("_Span", __base__=Block, **{"from": (float, _FROM)})
 
@@ -135,7 +135,7 @@ Bounds = dict[str, list[float]]
 
 
 def why_no_quantity(name: str, _bounds: list[float]) -> str:
-    """Explain why a name is not that of a gait quantity, or return '' if it is."""
+    """Explain that a name is not a gait quantity, or return '' if it is one."""
     text = f"names {name}, which is not a gait quantity; choose from {_QUANTITY_NAMES}"
     return "" if name in get_args(Quantity) else text
 
@@ -166,8 +166,8 @@ class Design(Block):
 class Plan(Block):
     """Measurements to plan, with their assumed noise."""
 
-    steps: int = key(20, "1", "steps of the walk for which standard errors are reported", ge=2, le=500)
-    max_steps: int = key(50, "1", "maximum number of steps of a walk to consider", ge=2, le=500)
+    steps: int = key(20, "1", "standard errors are reported for a walk of this many steps", ge=2, le=500)
+    max_steps: int = key(50, "1", "longest walk to consider, in steps", ge=2, le=500)
     errors: dict[str, float] = key(
         dict, "", "standard errors to reach, in the key's unit", bounds="a number above 0 for each key of identify.fit"
     )
@@ -242,7 +242,8 @@ class Case(Block):
     agreement: float = key(
         1e-4,
         "1",
-        "largest difference of times if a walk is repeated (tighter tolerance, other method, twin), in pendulum times",
+        "maximum difference between the times of a walk and of its repeats (other tolerance, method or size), in "
+        "pendulum times",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
@@ -277,7 +278,7 @@ class Sweep(Block):
     sample: str = key(
         "",
         "",
-        "how to draw points from the intervals, and how many, instead of using a grid",
+        "how many points to draw from the intervals, and by which method, instead of using a grid",
         bounds="latin-hypercube:N, sobol:N, random:N, or empty",
         default_in_words="empty",
     )

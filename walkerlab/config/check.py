@@ -61,7 +61,7 @@ def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
     if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
         return "rounded"
     longer = abs(right) - abs(printed.value)
-    # A small negative value that is cut off to zero is printed without its sign.
+    # A small negative value that is truncated to zero is printed without its sign.
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
     return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
 
@@ -113,7 +113,7 @@ class CheckSource(Block):
 
     title: Text | None = key(None, "", "title of the paper, thesis or program", bounds="any text")
     authors: Text | None = key(None, "", "its authors", bounds="any text")
-    year: int | Text | None = key(None, "", "year of its publication", bounds="a year")
+    year: int | Text | None = key(None, "", "year of publication", bounds="a year")
     where: Text | None = key(None, "", "table, equation or line", bounds="any text")
 
 
@@ -134,10 +134,10 @@ class PrintedAngles(_From):
     second: Literal["absolute", "relative", "stance-minus-swing"] = key(
         "absolute",
         "",
-        "angle of the second leg: absolute, like the first one; relative, swing leg minus stance leg (a shank's: minus "
-        "its thigh's); or stance-minus-swing, with the opposite sign",
+        "angle of the second leg: absolute, like the first one; relative, swing leg minus stance leg (for a shank, "
+        "shank minus thigh); or stance-minus-swing, with the opposite sign",
     )
-    unit: Literal["rad", "deg"] = key("rad", "", "unit of the angles, and of the rates per second")
+    unit: Literal["rad", "deg"] = key("rad", "", "unit of the angles; rates are in this unit per second")
     positive: Literal["counter-clockwise", "clockwise"] = key(
         "counter-clockwise", "", "direction of positive angles, for a walker that walks to the right"
     )
@@ -165,7 +165,7 @@ class PrintedAngles(_From):
 
 
 class Check(Block):
-    """A printed gait for `walkerlab check`. Give its numbers with all their digits, because zeros at the end count."""
+    """A printed gait for `walkerlab check`. Give its numbers with all their digits, because trailing zeros count."""
 
     source: CheckSource = CheckSource()
     angles: PrintedAngles = PrintedAngles()

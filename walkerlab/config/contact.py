@@ -50,12 +50,15 @@ class Contact(Block):
     )
     stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
     exponent: float = key(2.2, "1", "exponent e of the normal force, 1 for a linear spring", _ADAMS, ge=1.0, le=3.0)
-    damping: float = key(90.0, "N s/mm or N s/m", "c, reached at full_damping_penetration", _FIG_4B, ge=0.0, le=1e12)
+    damping: float = key(90.0, "N s/mm or N s/m", "damping c at full_damping_penetration", _FIG_4B, ge=0.0, le=1e12)
     full_damping_penetration: float = key(
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
     )
     friction: Literal[words("friction")] = key(  # type: ignore[valid-type]
-        "coulomb", "", "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground", _FRICTION
+        "coulomb",
+        "",
+        "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground; extensions add others",
+        _FRICTION,
     )
     static_friction: float = key(
         0.9, "1", "coefficient at stiction_velocity, where friction is largest", _SECTION_4, ge=0.0, le=100.0
@@ -91,8 +94,8 @@ class Contact(Block):
     pad_pitch: PadPitch = key(
         "rigid",
         "m",
-        "pitch of the checkerboard's pads: step length of the rigid or the contact (own) gait, or a length, "
-        "always in m; no effect on other terrains",
+        "pitch of the checkerboard's pads: step length of the rigid gait (rigid) or of the contact gait (own), or a "
+        "length, always in m; no effect on other terrains",
         _SECTION_4,
         bounds="rigid, own, or 1e-6 to 1e4",
     )

@@ -36,7 +36,7 @@ class Hip(Block):
     hinge_law: Literal[words("hinge_law")] = key(  # type: ignore[valid-type]
         LINEAR,
         "",
-        "law of the torques at hip and knees, to which these parameters belong; extensions add others",
+        "law of the hip and knee torques that these parameters belong to; extensions can add other laws",
         "this project" + origin_of("hinge_law"),
     )
 
@@ -56,7 +56,7 @@ class PushOff(Block):
 
     impulse_N_s: float = key(0.0, "N s", "impulse at the trailing foot, 0 for none", KUO, ge=0.0, le=STRONGEST)
     duration_s: float = key(
-        0.005, "s", "duration in the contact model; in the rigid model it acts instantaneously", ge=1e-9, le=10.0
+        0.005, "s", "duration in the contact model; the push-off of the rigid model is instantaneous", ge=1e-9, le=10.0
     )
     leg_2: SecondPushOff | None = None
 

@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from walkerlab.labels import add_unit
 
 RELATIVE_ROUNDING: Final = 1e-9
-"""Maximum relative difference of numbers that count as equal. It exceeds the rounding of unit conversions."""
+"""Numbers count as equal up to this relative difference. It exceeds the rounding of unit conversions."""
 
 DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
@@ -36,7 +36,7 @@ def short_number(number: float) -> str:
 
 
 def are_equal(first: Any, second: Any) -> bool:
-    """Whether two values are equal, numbers up to rounding."""
+    """Whether two values are equal. Numbers may differ by rounding."""
     if isinstance(first, float | int) and isinstance(second, float | int):
         return math.isclose(first, second, rel_tol=RELATIVE_ROUNDING)
     return bool(first == second)
@@ -103,12 +103,12 @@ def check_value(*names: str, why: Callable[[Any], str]) -> Any:
 
 
 def check_entries(*names: str, why: Callable[[str, Any], str]) -> Any:
-    """Validate each entry, a name and its value, of keys that hold several."""
+    """Validate each entry (name and value) of the keys that hold several entries."""
     return check_value(*names, why=lambda entries: next(filter(None, starmap(why, entries.items())), ""))
 
 
 def why_not_rising(name: str, bounds: Sequence[float] | None) -> str:
-    """Explain why the bounds of `name` are not two rising numbers, or return '' if they are, or if they are None."""
+    """Explain why the bounds of `name` are not two numbers in ascending order, or return '' if they are or are None."""
     if bounds is None or (len(bounds) == 2 and bounds[0] < bounds[1]):
         return ""
     return f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first"
@@ -132,8 +132,8 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """Return the type of the block that a key holds, or None if the key holds a value. Of several kinds, take the
-    first."""
+    """Return the type of the block that a key holds, or None if the key holds a value. If it can hold several types
+    of block, return the first."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -141,7 +141,7 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """Map each word of the key `type` to the type of block that it selects, or return {} if a key holds only one
+    """Map each value of the key `type` to the type of block that it selects, or return {} if a key holds only one
     type."""
     kinds = {}
     for candidate in get_args(field.annotation):
@@ -168,7 +168,7 @@ def leaves(
 
 @cache
 def keys_with_blocks(block: type[Block]) -> tuple[tuple[str, FieldInfo, type[Block] | None], ...]:
-    """Return name, field and, as in `block_of`, inner block of each key."""
+    """Return the name, the field and the inner block (see `block_of`) of each key."""
     return tuple((name, field, block_of(field)) for name, field in block.model_fields.items())
 
 
@@ -185,7 +185,7 @@ def value_at(config: Any, path: Iterable[str]) -> Any:
 
 
 def replace_key(block: Any, path: str, value: Any) -> Any:
-    """Return a copy of a block with another value, which is not validated, at a path of keys."""
+    """Return a copy of a block in which the value at a path of keys is replaced, without validating the new value."""
     name, _, tail = path.partition(".")
     return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
 

@@ -28,7 +28,7 @@ class ConfigFile:
     """A config file, or a config that is stored with a run."""
 
     path: Path  # path of the file; for a run, the name of its folder
-    label: str  # how messages name it
+    label: str  # name used in messages
     text: str | None = None  # config stored with a run or artifact; None to read the file
     changes: tuple[str, ...] = ()  # KEY=VALUE settings that made the run's config from its file
 
@@ -63,8 +63,8 @@ PUBLISHED: Final = Path("published")
 
 
 def find_config(path: Path | None) -> ConfigFile:
-    """Find the config that `--config` names: an existing path, or the name of a built-in config or of a published
-    gait. For None, it is the paper's."""
+    """Find the config that `--config` names: an existing path, or the name of a built-in config or published gait.
+    Without `--config`, return the paper's config."""
     if path is None:
         return builtin_config(DEFAULT)
     if not is_file(path):
@@ -174,8 +174,8 @@ def _describe_choices() -> str:
 
 
 def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
-    # Only the error message uses `reference`, the position of the file's name, and `purpose`, what the file should hold
-    # if it is not a config.
+    # Only the error message uses `reference`, the position of the file's name, and `purpose`, the expected contents of
+    # a file that is not a config.
     if file.text is not None:
         return file.text
     kind = "file" if purpose else "config"

@@ -74,7 +74,7 @@ class Identify(Recorded):
         "whether to report the identified gait's sensitivity norm (change of the step period for a drop of the floor)",
     )
     loss: Literal["linear", "soft_l1"] = key(
-        "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
+        "linear", "", "linear: least squares; soft_l1: outliers count in proportion to their size, not its square"
     )
     _one_offset = check_against("nuisance", "camera_tilt_deg", why_two_offsets)
 
@@ -82,7 +82,8 @@ class Identify(Recorded):
     def sensors(self) -> tuple[Nuisance, ...]:
         """Properties of clock and sensors to estimate.
 
-        A free tilt of the camera is an offset of all angles, and so is the floor's normal if the slope is estimated.
+        A freely tilted camera adds an offset to all angles. So does measuring from the floor's normal if the slope is
+        estimated.
         """
         follows = self.camera_tilt_deg == "floor" and self.level == "angles" and "slope_deg" in self.keys
         return tuple(dict.fromkeys((*self.nuisance, *((OFFSET,) if follows or self.camera_tilt_deg == "free" else ()))))

@@ -22,13 +22,14 @@ from walkerlab.config.validation import align_start, key_at, node_at, validate_t
 from walkerlab.errors import ConfigError
 
 IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
-"""Steeper than any slope on which passive walkers are known to walk. A larger value is perhaps in degrees."""
+"""Steeper than any slope on which passive walkers are known to walk. A larger value was probably given in degrees."""
 IMPLAUSIBLE_LENGTH_M: Final = 20.0
-"""Longer than the legs of any real walker. A larger value is perhaps in millimetres."""
+"""Longer than the legs of any real walker. A larger value was probably given in millimetres."""
 IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
-"""Stronger than the gravity of any planet in the solar system. A larger value is perhaps in cm/s^2."""
+"""Stronger than the gravity of any planet in the solar system. A larger value was probably given in cm/s^2."""
 WATER_KG_M3: Final = 1000.0
-"""Density of water. A mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
+"""Density of water. A mass above that of a cube of water with sides as long as the legs was probably given
+in grams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class LoadedConfig:
     run_name: str  # name of the run's folder inside the runs folder
     # KEY=VALUE of each key that differs from the config's file; earlier changes of a stored run come first
     changes: tuple[str, ...]
-    warnings: tuple[str, ...]  # sentences on adjusted and on suspicious values
+    warnings: tuple[str, ...]  # about adjusted or suspicious values, one sentence each
     source: str  # name of the config's file in messages
     tree: BlockNode  # untyped tree of the config, with positions
     base_tree: BlockNode  # the same without settings
@@ -118,8 +119,8 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: schema.Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: wrong units, a pad pitch without pads, a leg mass left in place as the leg
-    grew."""
+    """Yield warnings about likely mistakes: wrong units, a pad pitch without pads, or a leg mass that was not moved
+    when the leg length was changed."""
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
@@ -221,7 +222,7 @@ def paper_config_with_tree(upper: BlockNode) -> schema.Config:
 
     Raises ConfigError with positions if the result is invalid.
     """
-    # With SI units, missing keys of the contact block keep the physical values of the paper, not the numbers.
+    # With SI units, keys missing from the contact block take the paper's physical values, not its numbers.
     layers = files.read_layers(files.builtin_config(files.DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, BlockNode) else None

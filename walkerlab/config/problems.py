@@ -33,7 +33,7 @@ BEYOND_SCOPE: Final = {
     r"3-?d\b|three-?d|spatial|lateral": "walkerlab is planar: its walkers move in one vertical plane",
     r"quadruped|four-?leg|hexapod|monoped": "walkerlab's walkers have two legs",
 }
-"""Patterns of words for features that walkerlab lacks, and the reason for each."""
+"""Patterns that match words for features that walkerlab lacks, each with an explanation."""
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 

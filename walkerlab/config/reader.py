@@ -65,7 +65,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
 
     try:
         yield from YAML(typ="safe", pure=True, plug_ins=[]).parse(text)
-    except Exception as error:  # the parser fails in many ways on input that is no config
+    except Exception as error:  # the parser fails in many ways on input that is not a config
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__

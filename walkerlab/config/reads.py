@@ -28,15 +28,16 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """Map each key of a type (base classes first) to the type of the part that is read, or to None if it is read
-    completely."""
+    """Map each key that a type reads (those of base classes first) to the type that lists what is read within it, or to
+    None if the key is read completely."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 
 
 def _part(member: property) -> type | None:
     getter: Any = member.fget
-    result_type = getter.__globals__.get(getter.__annotations__.get("return"))
+    annotation = getter.__annotations__.get("return")  # a name if the module postpones annotations
+    result_type = getter.__globals__.get(annotation, annotation)
     # A type that is not a Protocol is a config block, which is read completely.
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
@@ -177,7 +178,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for a walker other than the paper's. Its scene is varied by the extreme cases."""
+    """Keys that `stability` reads for a walker other than the paper's. The extreme cases vary its scene."""
 
     @property
     def stability(self) -> OwnCases: ...
@@ -189,7 +190,7 @@ class MapCells(Protocol):
 
 
 class MapsConfig(Protocol):
-    """Keys that `stability-maps` reads. The maps are of the paper's config."""
+    """Keys that `stability-maps` reads. The maps are computed for the paper's config."""
 
     @property
     def stability(self) -> MapCells: ...

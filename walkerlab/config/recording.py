@@ -30,7 +30,7 @@ class Recorded(Block):
     walks: Literal["left", "right", "away", "towards"] | None = key(
         None,
         "",
-        "direction of a walk, as the recording sees it; right is the first horizontal axis of markers",
+        "direction of the walk in the recording; right is along the first horizontal axis of the markers",
         default_in_words="the one in which swinging feet move",
     )
     camera_tilt_deg: Tilt | None = key(
@@ -39,12 +39,12 @@ class Recorded(Block):
         "how far the direction from which angles are measured leans forward from the vertical; "
         "floor: as far as the floor's normal, free: find it from the recording",
         bounds="-45 to 45, floor, free",
-        default_in_words="0, or floor if the file's program levels the floor",
+        default_in_words="0, or floor if the program that wrote the file levels the floor",
     )
     belt_speed_m_s: float | None = key(
         None,
         "m/s",
-        "speed of a treadmill's belt, which gives the lengths of steps",
+        "speed of the treadmill's belt, from which step lengths are computed",
         gt=0.0,
         le=1e3,
         default_in_words="no belt",

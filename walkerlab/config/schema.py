@@ -56,7 +56,7 @@ StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
 # An angle or rate that can be computed from the others may be null.
 State = tuple[SwingAngle | None, StanceAngle, Rate, Rate]
-LongState = tuple[Rate | None, ...]  # states of walkers with more bodies than two legs
+LongState = tuple[Rate | None, ...]  # states of walkers with more than two bodies
 
 
 MID_STEP: Final = "mid-step"
@@ -169,7 +169,7 @@ class Tune(Block):
     cells: int | None = key(
         None,
         "1",
-        "cells of the map along each axis, which shows the factors of one velocity",
+        "cells along each axis of the map; the axes are the factors of the two velocities",
         default_in_words="61 for the paper's compass, 21 for other walkers",
         ge=2,
         le=501,
@@ -193,7 +193,7 @@ QUESTIONS: Final = (
 class Source(Block):
     """Study that a config reproduces, as named in the report."""
 
-    title: Text = key(..., "", "title of the study", bounds="any text, not empty", min_length=1)
+    title: Text = key(..., "", "title of the study", bounds="any non-empty text", min_length=1)
     authors: Text | None = key(None, "", "its authors", bounds="any text")
     published: Text | None = key(None, "", "where and when it was published", bounds="any text")
     url: str | None = key(
@@ -213,7 +213,7 @@ class Config(Block):
         "",
         "name of the run folder",
         default_in_words="the file's own name",
-        bounds="1 to 64 letters, digits, '.', '_' or '-', no '-' or '.' in front and no '.' at the end",
+        bounds="1 to 64 letters, digits, '.', '_' or '-', not starting with '-' or '.' and not ending with '.'",
         pattern=r"^[A-Za-z0-9_]([A-Za-z0-9._-]{0,62}[A-Za-z0-9_-])?$",
     )
     source: Source | None = None
@@ -238,9 +238,9 @@ class Config(Block):
     start: Start = key(
         "fixed-point",
         "rad, rad, rad/s, rad/s",
-        "fixed-point; or the state just after a heel strike, [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
-        "swings and leg 2 stands (null for theta_1 computes it so that both feet stand on the slope); or a state in "
-        "mid-step",
+        "fixed-point, the state just after a heel strike, or a state in mid-step. After a heel strike: [theta_1, "
+        "theta_2, dtheta_1, dtheta_2], where leg 1 swings and leg 2 stands. If theta_1 is null, it is computed so that "
+        "both feet stand on the slope.",
         "eq. 11",
         bounds="fixed-point, four numbers (angles up to 2 pi, velocities up to 1e6), or "
         "{instant: mid-step, state: [...]}",

@@ -12,7 +12,7 @@ def second_leg(unit: str, least: float | None = None) -> Any:
 
 
 class SecondCompassLeg(Block):
-    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+    """Properties of leg 2 that differ from those of leg 1, which swings first."""
 
     leg_length_m: float | None = second_leg("m", 1e-3)
     foot_to_mass_m: float | None = second_leg("m", 0.0)
@@ -22,7 +22,7 @@ class SecondCompassLeg(Block):
 
 
 class SecondStraightLeg(Block):
-    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+    """Properties of leg 2 that differ from those of leg 1, which swings first."""
 
     leg_length_m: float | None = second_leg("m", 1e-3)
     leg_mass_kg: float | None = second_leg("kg", 1e-12)
@@ -34,7 +34,7 @@ class SecondStraightLeg(Block):
 
 
 class SecondThigh(Block):
-    """Keys of the thigh of leg 2 that differ from those of leg 1."""
+    """Properties of the thigh of leg 2 that differ from those of leg 1."""
 
     length_m: float | None = second_leg("m", 1e-3)
     mass_kg: float | None = second_leg("kg", 1e-12)
@@ -44,7 +44,7 @@ class SecondThigh(Block):
 
 
 class SecondShank(Block):
-    """Keys of the shank of leg 2 that differ from those of leg 1."""
+    """Properties of the shank of leg 2 that differ from those of leg 1."""
 
     length_m: float | None = second_leg("m", 1e-3)
     mass_kg: float | None = second_leg("kg", 1e-12)
@@ -54,13 +54,13 @@ class SecondShank(Block):
 
 
 class SecondKnee(Block):
-    """Keys of the knee of leg 2 that differ from those of leg 1."""
+    """Properties of the knee of leg 2 that differ from those of leg 1."""
 
     damping_N_m_s_per_rad: float | None = second_leg("N m s/rad", 0.0)
 
 
 class SecondKneedLeg(Block):
-    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+    """Properties of leg 2 that differ from those of leg 1, which swings first."""
 
     thigh: SecondThigh = SecondThigh()
     shank: SecondShank = SecondShank()
@@ -94,7 +94,7 @@ def describe_second_leg(walker: Any) -> str:
 
 
 def lock_knee(thigh: Any, shank: Any) -> dict[str, float]:
-    """Return the keys of a straight leg that is made of a thigh and a shank."""
+    """Return the keys of the straight leg that a thigh and a shank form when the knee is locked."""
     mass = thigh.mass_kg + shank.mass_kg
     below = thigh.mass_kg * thigh.mass_below_hip_m + shank.mass_kg * (thigh.length_m + shank.mass_below_knee_m)
     ahead = thigh.mass_kg * thigh.mass_ahead_m + shank.mass_kg * shank.mass_ahead_m

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Place in a config text: file or option, line and column from 1. Line 0 means the entire source."""
+    """Place in a config text: file or option, with line and column counted from 1. Line 0 means the entire source."""
 
     source: str
     line: int
@@ -24,7 +24,7 @@ class Position:
 
 
 NOWHERE = Position("", 0, 0)
-"""Position of values passed from Python, which stand in no file or option."""
+"""Position of values passed from Python, which come from neither a file nor an option."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,9 +63,9 @@ def validate_tree(tree: BlockNode) -> schema.Config:
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
     if isinstance(check := tree.entries.get("check"), BlockNode):
-        # Zeros at the end of a printed value count, but would be lost if the text became a number.
+        # Trailing zeros of a printed value count, but would be lost if the text became a number.
         data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
-    # The schema has only slope_rad. A slope in degrees is validated by another model and then converted.
+    # The schema has only slope_rad. A slope in degrees is validated by a class of its own and then converted.
     if "slope_deg" in data:
         try:
             data["slope_rad"] = math.radians(schema.SlopeInDegrees(slope_deg=data.pop("slope_deg")).slope_deg)
@@ -91,7 +91,7 @@ class FollowingValue(NamedTuple):
 
 
 def align_start(config: schema.Config, tree: BlockNode) -> tuple[schema.Config, tuple[str, ...]]:
-    """Compute the values of the start that follow from others, and describe how much stated values had to be changed.
+    """Compute the start values that the others determine, and describe by how much stated values were changed.
 
     Raises ConfigError, with the position in the file, if a missing value cannot be computed or a stated one is far off.
     """
@@ -130,8 +130,8 @@ def following_values(config: schema.Config, stated: Sequence[float | None]) -> d
     """Return the values of a start that can be computed from others, by index.
 
     Just after a heel strike, both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
-    for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
-    their coupling.
+    for walkers assembled from parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and
+    rates of their coupling.
     """
     walker = config.walker
     bodies = len(stated) // 2
@@ -240,7 +240,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[fields.Block]) -
 
 
 def advise_extensions() -> str:
-    """Return the end of an error message, which lists the installed extensions.
+    """Return the last part of an error message: a list of the installed extensions.
 
     Another extension may add the missing word.
     """
@@ -249,7 +249,7 @@ def advise_extensions() -> str:
 
 
 def _is_later(place: Position, earlier: Position) -> bool:
-    """Whether the user set the value at `place` on top of the value at `earlier`."""
+    """Whether the user's value at `place` overrides the value at `earlier`."""
     return place.source.startswith("--") or (bool(place) and earlier.source.startswith("built-in"))
 
 
@@ -326,7 +326,7 @@ def _keys_of_another_kind(
 
 
 def _find_key_elsewhere(name: str, exactly: bool) -> str:
-    """Return the path of the key, in any block, whose name is nearest (if `exactly`, equal) to `name`, or ''."""
+    """Return the path of the key with the name nearest to `name` (equal to it, if `exactly`) in any block, or ''."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(fields.leaves(schema.Config)))}
     # A dotted name is compared with whole paths.
     if "." in name:

@@ -103,7 +103,8 @@ class _Legged(Block):
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle (rad) from the line of a leg to the line from hip to foot centre, or 0 for walkers of parts."""
+        """Angle (rad) from the line of a leg to the line from hip to foot centre, or 0 for walkers assembled from
+        parts."""
         return math.atan2(getattr(self, "foot_centre_ahead_m", 0.0), self.leg_length_m - self.foot_radius_m)
 
     def swing_angle(self: Any, stance_rad: float) -> float | None:
@@ -285,7 +286,7 @@ class KneeJoint(Block):
     """How knees lock and are released."""
 
     lock: Literal["ideal", "compliant"] = key(
-        "ideal", "", "ideal: a plastic impact, then one body; compliant: a one-sided stop, then latched", HSU_CHEN
+        "ideal", "", "ideal: a plastic impact joins thigh and shank; compliant: a one-sided stop that latches", HSU_CHEN
     )
     at_heel_strike: Literal["locked", "free"] = key(
         "locked", "", "the trailing knee during the heel strike: locked and released just after it, or free", HSU_CHEN
@@ -522,13 +523,13 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 
 def is_passive_compass(config: Any) -> bool:
-    """Whether the config's walker is a passive compass without torso and with equal legs, as in Appendix A."""
+    """Whether the config's walker is a passive compass with equal legs and no torso, as in Appendix A."""
     compass = config.walker.type == "compass" and config.walker.torso is None and config.walker.leg_2 is None
     return bool(compass and not drives_and_springs_of(config))
 
 
 def leg_inertia(walker: Any) -> float:
-    """Return the inertia of one leg about the hip (kg m^2). For walkers of parts, it is an upper bound."""
+    """Return the inertia of one leg about the hip (kg m^2). For walkers assembled from parts, it is an upper bound."""
     if walker.type == "compass":
         below = walker.leg_length_m - walker.foot_to_mass_m
         return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
@@ -625,9 +626,9 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
 
 
 def load_walkers() -> dict[str, type[Block]]:
-    """Import the walker types that extensions add, by the word that names each in a config.
+    """Import the walker types that extensions add, keyed by their names in a config.
 
-    Warns of types that cannot be imported, and leaves them out.
+    Types that cannot be imported are skipped with a warning.
     """
     types = {}
     for word, code in code_by_word("walkers").items():

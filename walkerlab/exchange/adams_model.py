@@ -1,8 +1,8 @@
 """Description of a walker by ADAMS objects (parts, markers, joints, forces, requests), in N, mm, kg and s.
 
 The walk takes place in the x-y plane, x along the slope and y normal to it. Gravity is tilted.
-Expressions have markers and variables in braces, as in DX({leg_1.foot}). Each file format puts its names in their
-place.
+In expressions, markers and variables stand in braces, as in DX({leg_1.foot}). Each file format replaces them with its
+own names.
 """
 
 import math
@@ -192,7 +192,7 @@ class AdamsModel:
             yield run.format(finite(end_s))
 
     def switch(self, word: str, name: str) -> str:
-        """Return the command that activates or deactivates (`word`) the object `name`."""
+        """Return the command that activates or deactivates the object `name`, depending on `word`."""
         kinds = (("motion", self.motions), ("sensor", self.sensors), ("sforce", self.torques), ("jprim", self.joints))
         kind = next(kind for kind, objects in kinds if name in objects)
         return f"{word}/{kind}, id = {self.numbers[name]}"
@@ -345,7 +345,7 @@ class FootTerms:
         lane = round(terrain.lanes[self.foot] / terrain.pitch)
         shift = MM * self.export.lane_shift_m(self.foot)
         along = f"(DX({self.place()}){-shift:+.17g})" if shift else f"DX({self.place()})"
-        # The cosine is positive on the pads, because they are one pitch long and two pitches apart.
+        # The cosine is positive on the pads, because pads are one pitch long and their centres two pitches apart.
         wave = f"{'-' if lane % 2 else ''}COS(PI*{along}/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
@@ -408,10 +408,10 @@ def add_contacts(model: AdamsModel, export: Exported) -> None:
 
 
 def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
-    """Add slip, normal force and friction of each foot by the laws of walkerlab, as functions of time and state."""
+    """Add slip and walkerlab's laws of normal force and friction for each foot, as functions of time and state."""
     if export.heights is not None:
         raise ConfigError(
-            "Uneven ground cannot be written as functions.", "Export with --law contact, or leave out the block ground."
+            "Functions cannot describe uneven ground.", "Export with --law contact, or leave out the block ground."
         )
     normal, friction = laws(export)
     model.markers[BELOW] = Marker(GROUND, (0.0, -FREE_LENGTH_MM, 0.0))
@@ -425,7 +425,7 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
 
 
 def friction_function(leg: str, law: Coulomb) -> str:
-    """Return the expression for the friction force on the foot of a leg, by its slip and normal force."""
+    """Return the expression for the friction force on a leg's foot, as a function of its slip and normal force."""
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)

@@ -36,8 +36,8 @@ UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Name of the quantity that holds the position (m), in the direction of the walk, of the upper marker of the first
-line. It exists if the angles are computed from lines between markers.
+"""Name of the quantity for the position (m) of the first line's upper marker along the direction of the walk. It
+exists if the angles are computed from lines between markers.
 """
 SAMPLE: Final = "sample"
 """Name of the quantity that numbers the samples of the file, counted from 1."""
@@ -60,12 +60,12 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)  # reason, by quantity, why a column is not used
+    left_out: dict[str, str] = field(default_factory=dict)  # reason why a column is not used, by quantity
     walks: str = ""  # stated direction of the walk, or '' if it has to be found
     unit_is_stated: bool = True  # whether the file or the user states the unit of the leg angles explicitly
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
     doubts: tuple[str, ...] = ()  # oddities of the recording, and how they were handled
-    gaps: str = ""  # description of samples within the walk that are left out because values are missing
+    gaps: str = ""  # which samples within the walk are left out because of missing values
     tilt_rad: float = 0.0  # forward lean (rad) of the direction from which angles are measured
     belt_m_s: float = 0.0  # speed of a treadmill's belt
     hip_is_in_m: bool = False  # whether the position of the upper marker is in a known unit
@@ -116,7 +116,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
     # Frozen markers of lines are found later, marker by marker, see `body_gaps`.
     recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
-    # A fault in a column that every walk needs, or that the user names, is an error. Other columns are only left out.
+    # A fault in a column that every walk needs, or that the user names, is an error. Other faulty columns are left out.
     needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
     time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
     rows = select_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
@@ -182,8 +182,7 @@ def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, l
         if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
             raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
     elif intervals.size and (typical := float(np.median(intervals))) > 0.0:
-        # If frames are missing from the file, times there are farther apart. Rounding counts the missing frames as
-        # well.
+        # Where frames are missing, the intervals between times are longer. Rounding counts the missing frames, too.
         frames = np.round((stated - stated[0]) / typical)
         value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
         if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
@@ -232,7 +231,7 @@ def remove_unlikely_positions(
 
 
 def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Mark angles as gaps where they stand still for some samples and then leap.
+    """Mark angles as gaps where they stay constant for some samples and then jump.
 
     Software that fills gaps produces such angles.
     """
@@ -300,9 +299,9 @@ def select_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
-    """Return the columns of the upper and lower end of a line for each coordinate, x, y or z, that both markers have.
+    """Return the columns of the upper and lower end of a line for each coordinate (x, y or z) that both markers have.
 
-    Return nothing if it is not a line. Raises ConfigError if a marker is missing.
+    Return nothing if `source` is not a line. Raises ConfigError if a marker is missing.
     """
     # The name of a column may itself contain '>'.
     line = None if source in recording.columns else LINE.fullmatch(source)
@@ -399,7 +398,7 @@ def normalise_name(name: str) -> str:
 def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Find the column of each quantity: the one with its name, otherwise the only one whose name ends in it.
 
-    Also return, by quantity, the reason if several columns could be meant.
+    Also return, for each quantity that several columns could match, an error message that names them.
 
     named  quantities to skip, because the user names their columns
     """
@@ -472,7 +471,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     column = named_column(recording, match[2].strip())
     if match[1] and LINE.fullmatch(column) and column not in recording.columns:
         raise ConfigError(
-            f"--columns: {text!r} changes the sign of a line's angle, which follows from the direction of the walk.",
+            f"--columns: {text!r} changes the sign of a line's angle, but the direction of the walk determines it.",
             "Leave out the sign, or state the direction with --walks.",
         )
     return ColumnSource(column, -1.0 if match[1] else 1.0, float(match[3].replace(" ", "")) * unit if match[3] else 0.0)
@@ -531,7 +530,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
     markers = [column.removesuffix(".x") for column in recording.columns if column.endswith(".x")]
     if markers and name.startswith("angle"):
         return ConfigError(
-            f"{recording.path} has no column for {name!r}, but markers: {', '.join(markers[:12])}.",
+            f"{recording.path} has no column for {name!r}, but it has markers: {', '.join(markers[:12])}.",
             f'Name the markers at the hip and at the foot: --columns "{name}=HIP>FOOT"',
         )
     near = get_close_matches(normalise_name(name), [normalise_name(column) for column in recording.columns], 1, 0.2)
@@ -542,7 +541,7 @@ def missing_error(recording: Recording, name: str) -> ConfigError:
 
 
 def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
-    """Raise ConfigError if a unit is stated for something unknown or for a quantity of another kind."""
+    """Raise ConfigError if a unit is stated for an unknown name or does not fit the kind it is stated for."""
     for name, unit in units.items():
         if name not in (*UNIT_VALUES, *quantities, *recording.columns):
             near = get_close_matches(name, (*UNIT_VALUES, *quantities, *recording.columns), 1)
@@ -562,7 +561,7 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
     unit = stated_unit(recording, name, source, kind, units)
     if not unit:
         raise ConfigError(
-            f"{recording.path} states no unit for {source!r} ({name}).",
+            f"{recording.path} gives no unit for {source!r} ({name}).",
             f"Add --units {kind}={SI[kind]}, or another unit: {', '.join(list(UNIT_VALUES[kind])[:6])}.",
         )
     if (value := value_in_si(unit, kind)) is None:
@@ -631,7 +630,7 @@ def places_of_ends(
 def scale_of_line(
     recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]
 ) -> dict[str, float] | None:
-    """Return the SI value of the unit of each column of a line's ends, or None if all have the same unknown unit."""
+    """Return the SI values of the units of a line's columns, or None if all columns have the same unknown unit."""
     columns = [column for pair in pairs for column in pair]
     stated = {stated_unit(recording, column, column, "length", units) for column in columns}
     # The angle of a line does not depend on the unit of length, as long as both ends share it.
@@ -641,7 +640,7 @@ def scale_of_line(
 
 
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Parse pairs such as `a=b,c=d` into a dictionary, in which quotes protect commas.
+    """Parse pairs such as `a=b,c=d` into a dictionary. Quotes protect commas.
 
     Raises ConfigError for any other form.
     """

@@ -103,9 +103,9 @@ class EngineScene:
 def engine_scene(
     config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
 ) -> EngineScene:
-    """Build the scene of a config without pinned foot or locked knees. `pad_pitch: own` becomes the rigid step length.
+    """Build the scene of a config without a pinned foot or locked knees. `pad_pitch: own` means the rigid step length.
 
-    asymmetry  difference between the step lengths of the rigid gait over their mean, which shifts the lanes of pads
+    asymmetry  difference between the rigid gait's step lengths divided by their mean, which shifts the lanes of pads
     """
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m, asymmetry)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
@@ -139,7 +139,7 @@ class EngineContact:
 
 
 def creep_velocity(friction: FrictionLaw, load: float) -> float:
-    """Return the slip velocity (m/s) at which friction carries `load`, a ratio of tangential to normal force."""
+    """Return the slip velocity (m/s) at which the friction force is `load` times the normal force."""
     # Bisect down to neighbouring floats, because importing the root finder of a library would slow down an export.
     low, high = 0.0, friction.rising_until
     while low < (middle := 0.5 * (low + high)) < high:

@@ -24,7 +24,7 @@ ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "m
 
 @dataclass(frozen=True)
 class ExportedFiles:
-    """Exported texts by file name, beginning with the model, and descriptions of what they leave out."""
+    """Exported texts by file name (the model comes first), and descriptions of what the export leaves out."""
 
     files: dict[str, str]
     left_out: tuple[str, ...]
@@ -74,7 +74,7 @@ def export_model(
 
 
 def choose(text: str, choices: tuple[Choice, ...], option: str, what: str) -> Choice:
-    """Return the choice whose name is the text of an option.
+    """Return the choice named by `text`, the value of an option.
 
     Raises ConfigError for an unknown name.
     """
@@ -90,7 +90,7 @@ def parse_law(text: str) -> Law:
 
 
 def parse_slope(text: str) -> Slope:
-    """Return the way to express a slope whose name is `text`. Raises the same error as `choose` if there is none."""
+    """Return the slope format named `text`. Raises the same error as `choose` if there is none."""
     return choose(text, SLOPES, "--slope", "way to express a slope")
 
 

@@ -1,4 +1,4 @@
-"""Walker to export, on its ground at the start of a walk, with walkerlab's simulation of that walk."""
+"""Walker to export, standing on its ground at the start of a walk, and walkerlab's simulation of that walk."""
 
 import re
 from collections.abc import Iterable, Iterator

@@ -39,32 +39,33 @@ MIN_VARIANCE: Final = 1e-30  # rad^2; added to variances, because they may be ze
 HIGHEST_DEGREE: Final = 7
 SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
 FAR_PERCENT: Final = 80  # legs are far apart if the angle between them is above this percentile
-# time before and after a first guess in which a strike is searched for, as a fraction of a step
+# search for a strike within this time before and after the first guess, as a fraction of a step
 SEARCH_RANGE: Final = 0.3
 MARGIN: Final = 0.2  # the fit of a strike keeps this distance from the neighbouring strikes, as a fraction of a step
-MAX_FIT_TIME: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
+MAX_FIT_TIME: Final = 1.3  # a fit extends at most this long before and after a strike, as a fraction of a step
 # a leg has jumped if its motion between two samples is above this multiple of the percentile FAR_PERCENT of motions
 MAX_MOTION: Final = 6.0
-# a leg counts as far ahead only if it stays so for this fraction of the percentile FAR_PERCENT of such times
+# a leg counts as far ahead only if it stays there for this fraction of a typical time ahead (percentile FAR_PERCENT)
 MIN_TIME_AHEAD: Final = 0.25
 MAX_STRETCH: Final = 0.3  # a leg that is off its curve for longer than this fraction of a step has jumped
-# A stretch that is closer than this fraction of a step to an end of a fit is left to the fits of neighbouring strikes.
+# A stretch this close to an end of the fitted span, as a fraction of a step, is left to the fits of other strikes.
 BORDER: Final = 0.1
 LASTING_BORDER: Final = 0.15  # the same for lasting jumps
 LENGTH_TRIALS: Final = 16  # number of lengths that are tried first for a stretch
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
 NEXT_TRIALS: Final = (9,)  # numbers of instants that are then tried around the best one
 STANDARD_ERRORS: Final = 7.0
-MIN_EXPLAINED_RATIO: Final = 6.0  # a stretch must explain this many times as much as those in typical steps
+# A stretch must explain at least this many times the sum of squares that the best one near a typical strike explains.
+MIN_EXPLAINED_RATIO: Final = 6.0
 TYPICAL_PERCENT: Final = 30
 MAX_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
 MIN_STRIKE_SAMPLES: Final = 12  # minimum number of samples in the two steps around a strike
 MAX_SCATTER: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
-# A stretch that explains more than this fraction of the limit is searched for together with the strike.
+# If a stretch explains more than this fraction of the detection limit, search for it and the strike time together.
 JOINT_SEARCH_FRACTION: Final = 0.5
-MIN_OFFSET: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
+MIN_OFFSET: Final = 0.008  # smallest offset that counts, as a fraction of the angle between the legs
 MAX_STRETCHES: Final = 30  # maximum number of stretches in the steps around a strike
-# A stretch is tested only if the part of it that polynomials cannot follow has at least this squared norm (samples).
+# A stretch is tested only if the part of it that polynomials cannot fit has at least this squared norm (in samples).
 MIN_NORM: Final = 0.12
 
 
@@ -73,17 +74,17 @@ class Way:
     """Stretch of a walk in one direction."""
 
     forwards: bool  # whether angles are positive with the foot ahead
-    passings: list[tuple[int, int]]  # first and last sample of each passing of the legs
+    passings: list[tuple[int, int]]  # first and last sample of each time the legs pass each other
 
 
 def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Return the walk with mended leg angles: continuous, from the vertical, positive with the foot ahead.
+    """Return the walk with mended leg angles: continuous, measured from the vertical, and positive with the foot ahead.
 
     source  name of the recording, for messages
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
-    # Full turns, reversed signs and swapped legs would look like samples off the course, so repair them first.
+    # Full turns, reversed signs and swapped legs would look like samples off their curves, so repair them first.
     mended = drop_off_course(swap_back(keep_one_way(unwrap(walk, source))))
     upright = {name: mended.quantities[name] - walk.tilt_rad for name in ("angle 1", "angle 2")}
     return replace(mended, quantities={**mended.quantities, **upright})
@@ -118,9 +119,9 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
         angle -= half_turns * math.pi
         if abs(middle - half_turns * math.pi) > UPRIGHT_RAD:
             raise ConfigError(
-                f"{source}: {name} lies around {math.degrees(middle):.0f} degrees from the vertical.",
-                "Angles must be from the vertical, positive with the foot ahead, in the right unit (--units). For "
-                f'angles from the horizontal: --columns "{name}={walk.sources.get(name, name)}+90deg".',
+                f"{source}: {name} is about {math.degrees(middle):.0f} degrees from the vertical.",
+                "Angles must be measured from the vertical, positive with the foot ahead and in the right unit "
+                f'(--units). For angles from the horizontal: --columns "{name}={walk.sources.get(name, name)}+90deg".',
             )
         walk = replace(walk, quantities={**walk.quantities, name: angle})
         if half_turns % 2:
@@ -257,12 +258,12 @@ def describe_doubts(walk: RecordedWalk) -> Iterator[str]:
         yield f"Not used: {name}: {reason.removesuffix('.')}."
 
 
-# Smooth course of the angles ------------------------------------------------------------------------------------------
+# Smooth curves through the angles -------------------------------------------------------------------------------------
 
 # Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before
 # and the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off its
 # curve if a constant added to it explains much more of the residuals than scatter does, and more than in typical
-# steps. The strike is located again for every stretch, because a wrong sample near a strike moves it.
+# steps. The strike is located again for every stretch, because a wrong sample near a strike shifts its time.
 
 
 @dataclass(frozen=True)
@@ -279,7 +280,7 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """Samples of the steps before and after a heel strike, and the span of time in which the strike may be."""
+    """Samples of the steps before and after a heel strike, and the time span in which the strike can lie."""
 
     time: Array
     angle: Array
@@ -327,7 +328,7 @@ class Strike:
         return self.best_stretch(self.fit(at)), left(at)
 
     def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
-        """Return the stretch that explains most of the residuals of a fit (basis and residuals)."""
+        """Return the stretch that explains the largest part of the residuals of a fit (basis and residuals)."""
         sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
         longest = max(1, int(np.searchsorted(self.time, self.time[0] + MAX_STRETCH * self.step_s)))
         lengths = np.unique(np.geomspace(1, longest, LENGTH_TRIALS).astype(int))
@@ -349,10 +350,10 @@ class Strike:
         return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
 
     def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
-        """Return the samples (first, end) that are farther from the ends than the fraction `part` of a step. Other fits
-        cover the rest.
+        """Return the range (first, end) of the samples farther than the fraction `part` of a step from both ends. Other
+        fits cover the rest.
 
-        whole  whether to go up to an end of the recording
+        whole  whether to include the samples up to an end that is also an end of the recording
         """
         away_s = part * self.step_s
         first, end = np.searchsorted(self.time, (self.time[0] + away_s, self.time[-1] - away_s))
@@ -454,7 +455,7 @@ def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
 
 
 def stretches_near(course: Course, index: int, limit: float, smallest: float) -> list[Stretch]:
-    """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
+    """Return those stretches in the steps around a strike whose offsets explain more than a limit (rad^2)."""
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the stretch that explains most if `others` are removed, or None if it explains less than the limit."""
@@ -554,7 +555,7 @@ class Course:
 
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
     """Build the course of a recording after removing `stretches`. Each span in which one leg is far ahead contains a
-    jump of the rates.
+    heel strike, where the rates jump.
     """
     course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
     time = course.time

@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk is along the horizontal line on which the legs move most relative to each other. The direction
-of the walk along this line shows only when the legs pass each other (see `leg_angles`).
+The walk is taken to be along the horizontal line on which the legs move most relative to each other. Which way it goes
+along this line shows only when the legs pass each other (see `leg_angles`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ MIN_FROZEN: Final = 3  # minimum number of missing samples for which a marker co
 # a leap covers the motion of at most this many normal samples for each frozen sample before it
 MAX_LEAP: Final = 1.5
 LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
-MAX_SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
+MAX_SLOW_CHANGE: Final = 0.02  # largest relative change of a leg's length along a walk
 MAX_HIP_MOTION: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
 MAD_TO_DEVIATION: Final = 1.4826  # standard deviation over median absolute deviation in a normal distribution
 PLANE_FITS: Final = 3
@@ -35,8 +35,8 @@ PLANE_FITS: Final = 3
 RUNNING_CORRELATION: Final = 0.5
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
-FAST_PERCENT: Final = 80  # motions between samples are fast above this percentile
-# An exchange of legs must lower the squared unevenness by at least this fraction of the square of a fast motion.
+FAST_PERCENT: Final = 80  # motions between samples above this percentile count as fast
+# Swapping two points back must lower the squared unevenness by at least this fraction of the squared fast motion.
 MIN_EXCHANGE_GAIN: Final = 0.2
 # It must also lower the squared unevenness by at least this multiple of its median.
 MIN_SCATTER_RATIO: Final = 40.0
@@ -76,8 +76,8 @@ def spell_samples(time: Array | None, numbers: Array, rows: NDArray[np.bool_]) -
 def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     """Find the samples (samples,) at which two points are exchanged. They are at most half of all samples.
 
-    Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each exchange must make
-    the motion more even by more than fast motions or scatter explain.
+    Exchanges are chosen so that both points move as evenly as possible from sample to sample. An exchange counts only
+    if it makes the motion more even than fast motion or scatter could explain.
 
     apart  (samples, axes) difference of the two points
     """
@@ -123,7 +123,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Undo exchanges between the markers of the two legs. Return the lines, and a doubt for each exchanged pair."""
+    """Undo exchanges between the markers of the two legs. Return the lines, and doubts about exchanged pairs."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -153,8 +153,8 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     """Find the plane of a walk from the lines between its markers.
 
     lines  line of each quantity, by name
-    walks  direction in the view of the recording: left, right, away or towards. If it is empty, it is the direction in
-           which the legs move most relative to each other, with the sign of the drift of the upper marker
+    walks  direction in the view of the recording: left, right, away or towards. If empty, the direction in which the
+           legs move most relative to each other is used, with the sign of the upper marker's drift
     """
     legs = legs_among(lines)
     upright = np.mean([np.mean(top - bottom, axis=0) for top, bottom in legs], axis=0)
@@ -189,14 +189,14 @@ def stated_direction(walks: str, up: Array) -> Array:
     away = np.cross(upwards, right)
     direction = {"right": right, "left": -right, "away": away, "towards": -away}[walks]
     if np.any(direction[up.size :]):
-        raise ConfigError(f"walks: {walks}, but the markers have no depth.", "Use left or right.")
+        raise ConfigError(f"walks: {walks}, but the markers have no depth coordinate.", "Use left or right.")
     return np.asarray(direction[: up.size])
 
 
 def replace_unseen(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Mark the coordinates of markers that were not seen as gaps. Also return the reasons, by column.
+    """Mark the coordinates of unseen markers as gaps. Also return the reasons, by column.
 
     Programs write zeros, or some other value, for all coordinates of a marker that they did not see. A foot may also
     stand at the origin, so equal coordinates are a gap only if they give the line an unusual length.
@@ -227,8 +227,8 @@ def replace_unseen(
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
     """Find the samples (samples,) at which a frozen marker repeats its position (samples, axes) before it leaps.
 
-    Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
-    missing, because a foot may have stood still before the gap.
+    Software that fills gaps repeats the last position seen. The number of missing samples follows from the
+    speed after the leap, because a foot may have stood still before the gap.
     """
     places = np.clip(places, -MAX_VALUE, MAX_VALUE)
     change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)

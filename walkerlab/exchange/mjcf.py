@@ -119,7 +119,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
     centres: list[Floats] = []
     mass_matrix = np.zeros((model.size, model.size))
     for number, link in enumerate(model.links):
-        # for each link, (3, coordinates) velocity of its hinge along and normal to the ground, and rate of turning
+        # for each link, (3, coordinates) velocity of its hinge along and normal to the ground, and its angular velocity
         hinge = np.zeros((3, model.size))
         if link.parent < 0:
             hinge[:, : len(model.freedoms)] = base_rates
@@ -206,7 +206,7 @@ def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, 
 
 
 def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: Mapping[str, float]) -> str:
-    """Write the contact pair of a foot and a named piece of ground. Only a pair can tune the damping of friction."""
+    """Write the contact pair of a foot and a named piece of ground. Only a pair has a setting for friction damping."""
     mu = contact["friction"]
     creep = inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
     return (
@@ -216,7 +216,7 @@ def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: 
 
 
 def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) -> str:
-    """Write spring and damper of a foot, which are the contact settings times the inverse weight of its link."""
+    """Write the spring and damper of a foot: the contact settings times the inverse weight of its link."""
     inverse_weight = inverse_weights(model).bodies[ball.link]
     d = contact["solimp_d"]
     stiffness = inverse_weight * contact["stiffness_N_m"]
@@ -291,7 +291,7 @@ def time_step_s(export: exported.Exported, contact: Mapping[str, float]) -> floa
 
 
 def hinge_names(export: exported.Exported) -> dict[int, Hinge]:
-    """Return the hinges of hip and knees, with names, the hip spring, dampers and the stops of compliant knees."""
+    """Return the hip and knee hinges with their names, the hip spring, the dampers and the stops of compliant knees."""
     weights = inverse_weights(export.model).joints
     stop = export.scene.ours.stop
     acts = f'stiffness="{export.hip.spring_N_m_per_rad!r}" damping="{export.hip.damping_N_m_s_per_rad!r}"'

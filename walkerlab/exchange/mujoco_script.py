@@ -1,4 +1,4 @@
-"""Simulate in MuJoCo a walker that walkerlab exported, with its drives and knees, and print its touchdowns.
+"""Use MuJoCo to simulate a walker exported by walkerlab, with its drives and knees, and print its touchdowns.
 
 Usage: python NAME.py [MODEL.xml] [steps] [--view]. The default is ten steps of NAME.xml in the same folder.
 The script needs the package mujoco.
@@ -66,7 +66,7 @@ class Walk:
             self.model.jnt_limited[knee] = 0
 
     def control(self, _model: Any, data: Any) -> None:
-        """Apply push-off and hip torque. Once in a time step, also look for touchdowns and update the knees."""
+        """Apply push-off and hip torque. Once per time step, also look for touchdowns and update the knees."""
         # MuJoCo's control callback is global, so it also runs for other data.
         if data is not self.data:
             return
@@ -98,7 +98,7 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Scale the damper of the friction with the load on the feet, as in ADAMS.
+        """Scale the friction damper with the load on the feet, as in ADAMS.
 
         At a strike the load is many times the weight.
         """

@@ -13,7 +13,7 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 PINNED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-# Smallest inertia, as a multiple of mass x length^2, because engines reject bodies without inertia.
+# Smallest inertia of a body, as a multiple of mass x length^2. Engines reject bodies without inertia.
 SMALLEST_INERTIA = 1e-13
 # Radius of the ball that replaces a point foot in engines. It must exceed the penetration.
 SMALLEST_BALL_M = 5e-4

@@ -116,7 +116,7 @@ PROGRAMS: Final = {
     re.compile(r"mass[ _]\w+\W+mass[ _]\w+[^\n]*\n"): ("Tracker with several tracks", TRACKS),
     re.compile(r"mass[ _]\w+\W*\n#?t\Wx\Wy"): ("Tracker with a single point", ONE_TABLE),
 }
-"""Tables that must be exported differently: how they begin, the program that wrote them, and our advice."""
+"""Tables that the user must export differently. Patterns of their beginnings map to the program and our advice."""
 
 
 C3D_PATIENCE_S: Final = 60.0
@@ -228,7 +228,7 @@ def read_delimited(path: Path) -> Recording:
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
     lines = merge_headers(remove_blanks(text.splitlines()))
     delimiter, header, unit_row, first = find_header(path, lines)
-    # Units are in brackets behind the names.
+    # Units are in brackets after the names.
     units = [match[1] if (match := UNIT_IN_NAME.search(name)) else "" for name in header]
     names = [UNIT_IN_NAME.sub("", name).strip() or f"column {number}" for number, name in enumerate(header, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
@@ -241,7 +241,7 @@ def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | N
     if not any(map(str.strip, lines)):
         return None
     try:
-        # With `comments=None`, a '#' is text in a cell, for which the caller has a message.
+        # With `comments=None`, a '#' counts as text in a cell, and the caller reports such cells.
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
@@ -424,7 +424,10 @@ def clock_times(cells: Sequence[str]) -> Array | None:
 
 
 def seconds_of(cell: str) -> float:
-    """Return the seconds of a duration, since midnight or, with a date, since 1970. Other cells give nan."""
+    """Convert a duration, a time of day or a date to seconds.
+
+    Times of day count from midnight, dates from 1970. Other cells give nan.
+    """
     for pattern in CLOCKS:
         if match := pattern.fullmatch(cell.replace(",", ".")):
             days, hours, minutes, seconds = (float(part or 0.0) for part in match.groups())
@@ -465,9 +468,7 @@ def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callabl
 
 
 def read_adams_results(path: Path) -> Recording:
-    """Read XML results of ADAMS (.res). They define components by ids, and have a number for each component in every
-    step.
-    """
+    """Read XML results of ADAMS (.res), which hold one value per component and output step, by component id."""
     try:
         root = ElementTree.fromstring(text_of(path))
     except ElementTree.ParseError as error:

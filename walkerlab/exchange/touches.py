@@ -1,9 +1,9 @@
 """Find the heel strikes in recorded angles.
 
-A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
-neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
-one polynomial before the strike and one after it. They meet at the strike, because only the rates jump there. The
-scatter of the angles around the fit gives the standard error of that time.
+A foot strikes when it is ahead and its height above the other foot falls to zero. Noise can cause several such
+crossings, so neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit
+of the angles: one polynomial before the strike and one after it. They meet at the strike, because only the rates jump
+there. The scatter of the angles around the fit gives the standard error of that time.
 
 Measured from the slope's normal, the leg angles are opposite at heel strike. An error in slope or sensor offset makes
 their sum non-zero where the rates jump: `sums_at_jumps` finds it.
@@ -28,14 +28,14 @@ ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
 """`DEGREES` and the next degree, whose fit shows the bias of the highest one."""
 MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
-MAX_FIT_TIME: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
+MAX_FIT_TIME: Final = 0.4  # a fit covers at most this fraction of the step period before and after a heel strike
 MIN_CROSSING_INTERVAL: Final = 0.25  # crossings of one leg within this fraction of the step period are one heel strike
-MIN_FALL_SPEED: Final = 0.25  # a crossing below this fraction of the median speed of falling feet is not a heel strike
+MIN_FALL_SPEED: Final = 0.25  # a crossing slower than this fraction of the median falling speed is not a heel strike
 ITERATIONS: Final = 20
 DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
 MAX_CORRECTION: Final = 1e-3  # a heel strike is located once a correction is below this many standard errors
 SIGNIFICANT_ERRORS: Final = 3.0  # a value within this many standard errors of zero counts as zero
-# duration of a heel strike on compliant ground, below which no fit can resolve its time
+# A heel strike on compliant ground takes this long, so no fit can time it more accurately.
 STRIKE_DURATION_S: Final = 1e-4
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
@@ -176,15 +176,15 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     if touch is None or touch.error_s >= PRECISE_S or off > SIGNIFICANT_ERRORS * touch.error_s:
         return None
-    # A strike just before the recording looks like one at the first sample, so the error includes the distance between
-    # them in the fit.
+    # A strike just before the recording looks like one at the first sample, so the error includes the time from the
+    # fitted strike to the first sample.
     return replace(touch, error_s=float(np.hypot(touch.error_s, off)))
 
 
 def locate_touch(
     time: Array, angle: Array, height: Height, near: float, leg: int, period: float
 ) -> Generator[Problem, Fits, Touch | None]:
-    """Locate the heel strike near a crossing by fits, which `fit_together` makes for all strikes at once.
+    """Locate the heel strike near a crossing. `fit_together` makes the fits for all strikes at once.
 
     Returns None if there are too few samples, or if the foot does not fall.
     """
@@ -254,14 +254,14 @@ def rows_within(time: Array, instant: float, half: float) -> slice:
 
 
 def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
-    """Build the heel strike of a leg from a fit that meets at the time `time` (s)."""
+    """Build the heel strike of a leg from a fit whose polynomials meet at `time` (s)."""
     # This is close to the best step for central differences in double precision.
     small = 1e-6 * np.eye(2)
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
     gradient = (values[:2] - values[2:]) / 2e-6
     slope = float(gradient @ next(iter(fit.rates.values())))
     error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), STRIKE_DURATION_S) if slope else np.inf
-    # The height is that of foot 0 over foot 1, so it rises as foot 1 comes down.
+    # The height is that of foot 0 above foot 1, so it rises as foot 1 comes down.
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
 
@@ -310,13 +310,13 @@ def fit_degrees(problems: Sequence[Problem]) -> list[Fits]:
 def fit_sides(
     times: Sequence[Array], values: Sequence[Array], sides: Sequence[str], degrees: Sequence[int]
 ) -> list[Fits]:
-    """Fit polynomials of each degree to each problem. They cover the given sides of the time 0, and meet there.
+    """Fit polynomials of each degree to each problem, on the given sides of time 0, where the two sides meet.
 
     Columns are in the order of the degrees, so that one factorisation serves all of them.
     """
     sizes = np.array([each.size for each in times])
     filled = np.arange(sizes.max()) < sizes[:, None]
-    # Pad problems that have fewer samples with rows of zeros.
+    # Fill up problems that have fewer samples with rows of zeros.
     t = np.zeros(filled.shape)
     y = np.zeros((*filled.shape, 2))
     t[filled] = np.concatenate(times)
@@ -357,7 +357,7 @@ def angles_at_jumps(
     the jumps.
 
     The delay is the same for all strikes. It is the shift that leaves the smallest residuals. Returns None unless the
-    shift exceeds `errors` of its standard errors and PRECISE_S.
+    shift is larger than PRECISE_S and than `errors` times its standard error.
 
     period  step period (s)
     errors  number of standard errors
@@ -421,7 +421,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return the sum of squares of the angles that rate jumps explain, divided by the variance of the residuals.
+    """Return the sum of squares that rate jumps explain in the angles, divided by the variance of the residuals.
 
     over  (samples,) rad, sum of the angles minus the sum to try
     runs  pairs of first and last samples; a jump is fitted in each, at the last instant at which `over` falls through 0
@@ -464,8 +464,8 @@ def typical_interval(instants: Sequence[float], time: Array) -> float:
 def squares_around(
     parts: Sequence[tuple[Array, Array]], instants: Array, degree: int, samples_per_degree: int = 1
 ) -> Array:
-    """Fit polynomials before and after each instant that meet there, and return the squared residuals (parts,
-    instants).
+    """Fit one polynomial before and one after each instant, such that they meet there, and return the sums of squared
+    residuals (parts, instants).
 
     parts               times (samples,), rising, and values (samples, legs) of each part of a recording
     instants            (parts, instants) rising along each row
@@ -476,7 +476,7 @@ def squares_around(
     rest = np.array([[t.size] for t, _ in parts]) - counts
     degrees = np.minimum(degree, 1 + np.stack((counts, rest)) // samples_per_degree)
     before = squares_before(parts, instants, counts, degrees[0])
-    # A fit after an instant is a fit before it in reversed time.
+    # Fit after an instant by fitting before it in reversed time.
     mirrored = [(-t[::-1], y[::-1]) for t, y in parts]
     after = [
         values[:, ::-1] for values in squares_before(mirrored, -instants[:, ::-1], rest[:, ::-1], degrees[1, :, ::-1])
@@ -492,8 +492,8 @@ def squares_before(
 ) -> tuple[Array, Array, Array]:
     """Fit polynomials to the first `counts` samples of each part, for each instant.
 
-    Returns the squared residuals (parts, instants), values at the instants (parts, instants, legs), and the variance
-    (parts, instants) of such a value if that of the samples is 1.
+    Returns the sums of squared residuals (parts, instants), the fitted values at the instants (parts, instants, legs),
+    and the variance (parts, instants) of a fitted value for samples of unit variance.
     """
     degree = int(degrees.max())
     each = zip(parts, instants, counts, strict=True)
@@ -512,7 +512,7 @@ def squares_before(
     fitted = counts > 1
     squares = np.where(fitted, np.maximum(total - np.sum(explained[..., :-1], axis=-1), 0.0), 0.0)
     values = np.sum(right[..., -1:] * solution[..., :-1], axis=-2)
-    # A side without a fit can have any value at the instant. With an infinite variance its gap costs nothing.
+    # A side without a fit can have any value at the instant. With an infinite variance, the gap adds no cost.
     return squares, values, np.where(fitted, explained[..., -1], np.inf)
 
 

@@ -42,7 +42,7 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-# An angle belongs to a shank if it reaches backwards this many times as far as at heel strikes.
+# An angle is taken for a shank's if its farthest backward swing is at least this many times the one at heel strikes.
 SHANK_SWING_RATIO: Final = 1.4
 MAX_SPREAD_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
@@ -50,17 +50,17 @@ INTERVALS: Final = 24  # largest number of knot intervals of the spline through 
 MAX_STEP_SAMPLES: Final = 250  # largest number of samples kept within a step
 MAX_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
-"""Smallest and largest plausible duration (s) or length (m) of a step. Other values are damaged or in another unit."""
-MIN_SPREAD_RAD: Final = 0.02  # a smaller angle between the legs at heel strikes raises a doubt about the unit
+"""Range of plausible durations (s) or lengths (m) of a step. Values outside it are damaged or in another unit."""
+MIN_SPREAD_RAD: Final = 0.02  # if the angle between the legs at heel strikes is smaller, its unit is doubtful
 MIN_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
-MAX_SCATTER: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
+MAX_SCATTER: Final = 0.2  # maximum scatter of the angles relative to the angle between the legs when they are far apart
 MIN_ALTERNATING_STRIKES: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
 MIN_ALTERNATION: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
-SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for the strikes of one leg, which are half of all
+SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, but for the strikes of one leg only, which are half of all strikes
 SEARCH_OFFSET_RAD: Final = 0.03  # the search for the tilt begins this far from the likely sum of angles
 MAX_BELT_DIFFERENCE: Final = 0.03
-"""Up to this relative difference, the distance over a belt and the distance from the leg angles raise no doubt."""
-# ratio of clock rates above which a clock that contradicts the swing of the legs raises a doubt
+"""Report a doubt if the distance walked on a belt and the one from the leg angles differ by more than this fraction."""
+# report a doubt about the clock if the legs would swing faster or slower than recorded by more than this ratio
 MAX_CLOCK_RATIO: Final = 1.15
 NOISE_IN_CLOCK: Final = 7.0  # MAX_CLOCK_RATIO grows by this multiple of the relative scatter of the angles
 TURN_RAD: Final = 1e-3  # rotation of the walker for the difference quotient of its potential energy
@@ -68,7 +68,7 @@ LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 # recorded values can show an error only if their spacing is at most this fraction of it
 MAX_SPACING: Final = 0.2
-MAX_ERROR_SCATTER: Final = 0.25  # an error counts as constant if its scatter over a step is below this fraction of it
+MAX_ERROR_SCATTER: Final = 0.25  # an error is constant if its scatter over a step is below this fraction of its mean
 MIN_DISTANCE_M: Final = 1e-30  # m, replaces smaller distances before we divide by them
 # time from the last sample of a step to the heel strike, as a fraction of the duration of the walk
 STRIKE_MARGIN: Final = 1e-10
@@ -106,7 +106,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_noise(angle, source)
 
     def height(angles: Array) -> Array:
-        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs."""
+        """Height (m) of leg 0's foot above leg 1's, normal to the slope, for straight legs."""
         return np.asarray(hips_apart(model, angles - 0.5 * touch_sum_rad).real + rise_of_soles(model))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -118,8 +118,8 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         raise ConfigError(
             f"{source} holds no complete step: {len(touches)} heel strikes were found, and the largest angle is "
             f"{float(np.abs(angle).max()):.3g} rad.",
-            "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "and over at least one whole step. The slope must be that of the ground (slope_deg).",
+            "Angles must be measured from the vertical, positive with the foot ahead (--columns) and in the right unit "
+            "(--units). They must cover at least one whole step. The slope must be that of the ground (slope_deg).",
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
@@ -154,7 +154,7 @@ def rise_of_soles(model: RigidModel) -> float:
 
 
 def sum_over_level(model: RigidModel, angles: Array) -> Array:
-    """Return the sums (samples,) of the angles of straight legs minus their sum with both feet on the slope (rad).
+    """Return how far the sums (samples,) of straight legs' angles exceed the sum with both feet on the slope (rad).
 
     For legs that are alike, these are the sums of the angles from the slope's normal.
     """
@@ -174,8 +174,8 @@ def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # Begin the search away from the likely sum, so that the shift to the jumps of the rates is larger than its
-        # error. A smaller shift would count as none, and the rough sum would remain.
+        # Begin the search away from the likely sum. Otherwise the shift found from the jumps of the rates could be
+        # smaller than its error. It would then be treated as zero, and the rough sum would remain.
         return np.asarray((total(angles) - sum_rad - SEARCH_OFFSET_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -242,7 +242,7 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
 
 
 def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
-    """Fit a polynomial to each step, and return its angles (rad) and rates (rad/s) of both legs, (samples, 2) each.
+    """Fit a polynomial to each step, and return the angles (rad) and rates (rad/s) of both legs, (samples, 2) each.
 
     Rates of a spline contain more noise, which would make kinetic energies too large.
     """
@@ -259,7 +259,7 @@ def smooth_motion(steps: RecordedSteps) -> tuple[Array, Array]:
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
-    """Return the longest sequence of heel strikes of alternate legs, and a list with a doubt if others are dropped."""
+    """Return the longest sequence of heel strikes of alternate legs. Also return doubts if others are dropped."""
     walks: list[list[Touch]] = [[]]
     breaks = []
     for touch in touches:
@@ -275,7 +275,7 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
 
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
-    """Yield a doubt for each leg of a kneed walker whose angle may not be that of the thigh."""
+    """Yield a doubt for each leg of a kneed walker whose recorded angle may not be the thigh's."""
     for leg, name in enumerate(("angle 1", "angle 2")):
         if not (model, model.exchanged)[leg].kneed:
             continue
@@ -300,7 +300,7 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Disagreement between the two signs of a heel strike, which are jumps of the leg rates and level feet."""
+    """Disagreement between the two signs of a heel strike: level feet, and a jump of the leg rates."""
 
     shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
     sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
@@ -358,10 +358,9 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
 def offset_doubts(
     time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Describe jumps of the rates while the feet are not level, and alternating steps, together with the error that
-    causes them.
+    """Describe alternating steps and rates that jump while the feet are not level. Also name the likely error.
 
-    A constant error of the angles explains them if both disappear once it is subtracted.
+    A constant error of the angles is the cause if both disappear once it is subtracted.
     """
     before = mismatch(time, angle, touches, model, touch_sum_rad)
     alternate = bool(before.lengths_m) and before.between_rad is not None
@@ -399,7 +398,7 @@ def refuse_noise(angle: Array, source: str) -> None:
         raise ConfigError(
             f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, but the legs are only {apart:.2g} "
             "rad apart, so any heel strikes found would be noise.",
-            "Smooth the angles, or record them better.",
+            "Smooth the angles, or record them with less noise.",
         )
 
 
@@ -423,7 +422,7 @@ def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
         raise ConfigError(
             f"{source}: steps of {step_s:.3g} s are not credible, because a leg of this walker swings forwards in "
             f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is wrong.",
-            "Smooth the angles or record them better, or correct the walker or the unit of time, e.g. --units time=ms.",
+            "Smooth the angles, record less noise, or correct the walker or the unit of time, e.g. --units time=ms.",
         )
 
 
@@ -441,7 +440,7 @@ def refuse_lengths(steps: RecordedSteps, source: str) -> None:
         if not is_plausible(length):
             raise ConfigError(
                 f"{source}: step {number}, up to time {steps.origin_s + time:.6g} s, would be {length:.3g} m long.",
-                "Check the angles there: they must be from the vertical, positive with the foot ahead (--columns).",
+                "Check that the angles there are measured from the vertical, positive with the foot ahead (--columns).",
             )
 
 
@@ -451,7 +450,7 @@ def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
         first, last = longest_gap(walk.time_s, begin, end)
         if last - first > MAX_GAP * (end - begin):
             raise ConfigError(
-                f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
+                f"{source}: step {number} has no samples from {first:.6g} to {last:.6g} s, which is "
                 f"{(last - first) / (end - begin):.0%} of its duration.{f' {walk.gaps}.' if walk.gaps else ''}",
                 f"Record at least {1 / MAX_GAP:.0f} samples per step, or read a part without gaps (--from-s, --to-s).",
             )

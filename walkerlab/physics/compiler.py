@@ -30,13 +30,13 @@ from walkerlab.physics.kernel_cache import cache_folder, files_of, lock_of, watc
 CHECKSUM_BYTES = 32  # length of the SHA-256 digest that precedes a kernel's stored code
 # index of the signature in the stored tuple
 SIGNATURE = 3
-# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit;
-# `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, so that divisions
-# need no test. References are not counted (_nrt), because kernels allocate nothing and borrow arrays from their caller,
-# and counting would take as long as the arithmetic.
+# The compiler must not contract or reorder arithmetic, so that code compiled twice gives the same results to the last
+# bit. `nsz` only lets it ignore the sign of a zero. A division by zero gives an infinity, as in NumPy, so that
+# divisions need no test. References are not counted (_nrt), because kernels allocate nothing and borrow arrays from
+# their caller, and counting would take as long as the arithmetic.
 FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
 bodies: dict[type, list[Callable[..., Any]]] = {}
-"""Functions that compiled code calls for a class, by class (see `kernels.ByType`)."""
+"""Functions that compiled code calls for each class (see `kernels.ByType`)."""
 files_in_use: set[str] = set()
 """Names of the files of machine code that this process has loaded or stored."""
 

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-# entries of the account (J, up to the present time). TORQUE is the work of the hip torque, a part of HIP_WORK, and
-# FORWARD is the positive work of that torque
+# entries of the account (J, up to the present time). TORQUE, the work of the hip torque, is part of HIP_WORK. FORWARD
+# is the positive work of that torque.
 DAMPING_LOSS, FRICTION_LOSS, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP_WORK, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1
 LOSS_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF)
@@ -47,6 +47,6 @@ LOSSES = (
     Loss(key="knee_strikes", where="in knee strikes", variable="", meaning="", cause="knees", colour="#CC79A7"),
     Loss(key="knee_stop", where="in the knees' stops", variable="", meaning="", cause="knees", colour="#CC79A7"),
 )
-"""Losses, in the order of the account."""
+"""Losses, in the order of the entries above."""
 SAMPLED = {index: loss for index, loss in enumerate(LOSSES) if loss.variable}
 CHANNELS = {loss.key: loss.where for loss in LOSSES}

@@ -2,7 +2,7 @@
 
 The cache has a folder for each state of the sources, version of numba and processor. A digest of all sources that
 kernels can use is part of the folder's name, so stale code never runs. The files of the package are used only if they
-were compiled from the present sources, with the present numba, and for a processor like this one.
+were compiled from the current sources, with the installed numba, and for a processor like this one.
 
 Compiled code is loaded only from the package, and from folders and files that no other user may have written.
 """
@@ -31,16 +31,16 @@ PACKAGE = PHYSICS.parent
 BUILT = PHYSICS / "machine_code"
 """Folder of the machine code compiled when the package was built."""
 REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
-ABOUT = "about.json"  # file in that folder with the properties on which its code depends
+ABOUT = "about.json"  # file in that folder with the properties on which the machine code depends
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
-# for each platform: LLVM's names of the processor for which builds are compiled, and of the features that it must have
+# for each platform: the processor that builds are compiled for and the features it must have, as LLVM names them
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "linux-x86_64": X86_64,
     "win32-amd64": X86_64,
     "linux-aarch64": ("generic", ("neon",)),
     "darwin-arm64": ("apple-m1", ()),
 }
-# the only packages that may contain compiled functions, which a test checks
+# Only these packages may contain compiled functions. A test checks this.
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 # A file may register a body with `.case(` without importing `kernels`.
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
@@ -96,7 +96,7 @@ def processor_name() -> str:
 
 
 def build_target() -> tuple[str, tuple[str, ...]] | None:
-    """Return the processor and features for which builds on this platform compile, or None for other platforms."""
+    """Return the processor and features that builds on this platform are compiled for, or None for other platforms."""
     return TARGETS.get(f"{sys.platform}-{platform.machine().lower()}")
 
 
@@ -139,7 +139,7 @@ def describe_origin() -> list[str]:
 
 
 def files_of(name: str) -> Iterator[Path]:
-    """Yield the files with machine code of this name: the package's, then that in the user's cache."""
+    """Yield the machine-code files with this name: first the package's, then the one in the user's cache."""
     if why_not_built() == "" and (BUILT / name).is_file():
         yield BUILT / name
     kept = cache_folder() / name
@@ -176,7 +176,7 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
 
 
 def _refusal(root: Path) -> str:
-    """Return why compiled code cannot be kept in a folder, which is created if necessary, or '' if it can."""
+    """Return why compiled code cannot be kept in a folder, or '' if it can. The folder is created if necessary."""
     try:
         make_private_folder(root)
         folder = root.resolve()
@@ -205,10 +205,10 @@ def cache_folder() -> Path:
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
     existed = os.path.lexists(folder)
-    # Closing a folder may delete it, and it is then created again.
+    # Closing a folder to other users may delete it, so that `mkdir` must create it again.
     folder = _closed_to_others(folder) if existed else folder
     folder.mkdir(0o700, exist_ok=True)
-    # There can be too many folders only after one was created.
+    # The number of folders grows only when one is created, so it is checked only then.
     if not existed:
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     # `_remove_unused` takes the folder's modification time as the time of its last use.

@@ -109,7 +109,7 @@ class ByType:
         body = self._bodies.get(chosen, self.default)
         if body is None:
             name = chosen.__name__ if hasattr(chosen, "_fields") else label
-            # Numba changes errors only if they are of numba's classes, so the user sees this one unchanged.
+            # Numba rewrites only errors of its own classes, so the user sees this one unchanged.
             raise TypeError(f"{self.__name__} has no case for {name}: register one with @{self.__name__}.case(...)")
         return body
 
@@ -136,7 +136,7 @@ class LawKind(NamedTuple):
     laws: dict[str, Any]  # classes of the built-in laws, by name in a config
     protocol: type
     required: tuple[ByType, ...]  # functions that need a case for each law
-    together: tuple[ByType, ...] = ()  # a law needs a case of all these functions or of none
+    together: tuple[ByType, ...] = ()  # a law must have a case in all of these functions or in none
     derived: bool = False  # whether a law's class must derive from `protocol`, whose fields it then has
 
 
@@ -155,7 +155,7 @@ class ByAddress(types.Type):
 
 
 def pass_by_reference(chosen: C) -> C:
-    """Let kernels pass a NamedTuple class by address. Python creates the values, and kernels only read their fields."""
+    """Let kernels pass values of a NamedTuple class by address. Python creates them, and kernels only read them."""
     # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
     # packing and unpacking them.
 

@@ -52,7 +52,7 @@ class ContactScene(contact_map.WalkerOnGround):
     ) -> ContactWalkResult:
         """Simulate up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
 
-        heights  (footholds,) m above the slope, from the start's foothold on; even ground by default
+        heights  (footholds,) m above the slope, beginning with the start's foothold; even ground by default
         """
         even = self.ground.terrain
         ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
@@ -71,10 +71,11 @@ def contact_scene(
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
     laws = ground_laws(contact)
+    rules = knee_rules(config.walker)
     assembly = assembly_of(config.walker)
     gravity = config.gravity_m_s2
     drives = contact_drives(config)
-    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, knee_rules(config.walker), drives=drives)
+    walker = contact_walker(assembly, *laws, gravity, config.slope_rad, rules, drives=drives)
     leg = config.walker.leg_length_m
     frame = contact_state.Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = contact_state.JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -114,11 +115,12 @@ def scene_on_pads(
 
 
 def contact_drives(config: reads.ContactConfig) -> ContactDrives:
+    law = hinge_law_of(config.walker)
     drives = drive_parameters(config)
     pulse = {"push_offs": drives.push_offs, "push_off_duration": config.push_off.duration_s}
     knees = {"knees": drives.knees} if drives.knees else {}
     fields = drives.shared | (pulse if any(drives.push_offs) else {}) | knees
-    return ContactDrives(hinge_law_of(config.walker), fields)
+    return ContactDrives(law, fields)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -132,7 +134,8 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     return KneeRules(normal_force.Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
-# Functions that build a terrain from pitch and asymmetry of the steps. At the start, leg 1 is a step behind leg 2.
+# Functions that build a terrain from the pads' pitch and the asymmetry of the steps. At the start, leg 1 is a step
+# behind leg 2.
 TERRAINS: dict[str, Callable[[float, float], terrain.Terrain]] = {
     "checkerboard": lambda pitch, asymmetry: terrain.checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
     "after-mid-swing": lambda pitch, _: terrain.after_mid_swing(pitch),
@@ -222,7 +225,7 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
 # Tolerances for maps. They give the same map as the config's tolerances, except at boundaries between outcomes.
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
-# evaluations per cell: a minimum, and a multiple of the number that the unchanged start takes
+# evaluations per cell: a multiple of what the unchanged start takes, but at least the minimum
 MIN_BUDGET, BUDGET_FACTOR = 60_000, 4
 
 
@@ -250,6 +253,7 @@ def steps_to_settle_on(gait: step_map.Cycle) -> tuple[tuple[float, float], ...]:
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the starts with the solver settings of a map.
 
-    evaluations  number of right-hand sides that the unchanged start takes. The budget of a cell is a multiple of it
+    evaluations  number of right-hand-side evaluations that the unchanged start takes. The budget of a cell is a
+                 multiple of it
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

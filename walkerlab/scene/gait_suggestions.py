@@ -1,7 +1,7 @@
 """Suggest changes that give a walker a gait: feet ahead of the shanks, or another slope.
 
 For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
-on a few slopes and follows their branches over the slope.
+on a few slopes and follows their branches as the slope changes.
 """
 
 import math
@@ -38,8 +38,8 @@ class SlopeRange:
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the end of the range (of the stable gaits, if there are any) that is nearer to
-        `target`.
+        """Find the end of the range (of the stable gaits, if there are any) that is nearer to `target`, and return a
+        slope just inside it.
         """
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
@@ -88,8 +88,8 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
 
 
 def suggest_gaits(scene: reads.RigidConfig) -> str:
-    """Suggest commands that find gaits for walkers or slopes near a scene that has none. On slopes that do not descend,
-    return ''."""
+    """Suggest commands that find gaits for similar walkers or slopes, if a scene has no gait. If the slope does not
+    descend, return ''."""
     if scene.slope_rad <= 0.0:
         return ""
     config = rigid_config(scene)
@@ -128,7 +128,10 @@ def rigid_config(scene: reads.RigidConfig) -> schema.Config:
 
 
 def find_gait_with_feet_ahead(config: schema.Config) -> tuple[float, fixed_point.RigidGait] | None:
-    """Return how far ahead of the shanks (m) the feet have to be for the most stable gait, and this gait, or None."""
+    """Return the distance of the feet ahead of the shanks (m) that gives the most stable gait, and that gait.
+
+    Returns None if no distance gives a gait.
+    """
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).vary(config, rigid_walker)(ahead_m)

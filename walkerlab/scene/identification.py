@@ -64,10 +64,10 @@ Values = tuple[float, ...]
 
 
 class Fixed(NamedTuple):
-    """A parameter, or a property of clock and sensors, that is not estimated."""
+    """A parameter, or a property of the clock or a sensor, that is not estimated."""
 
     name: str
-    value: float  # 0 for properties of clock and sensors
+    value: float  # 0 for properties of the clock and the sensors
     scale: float  # typical change
     unit: str
     slope: Floats  # (values,) derivative of the predicted values with respect to the parameter divided by `scale`
@@ -80,24 +80,24 @@ class Fixed(NamedTuple):
 
 LEGS: Final = (1, 2)
 Begin = Callable[[str, int], Callable[[], None]]
-KEPT_CONFIGS: Final = 512  # numbers of changed configs and of their walkers that are cached
+KEPT_CONFIGS: Final = 512  # maximum number of changed configs in the cache, and of their walkers
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # a parameter this near to a bound, relative to its scale, counts as at the bound
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
 # Errors of walks at these tolerances are near 1e-10, far below noise.
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
-MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
-STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
-LINEAR_MOVE: Final = 0.3  # largest change, in the scale of the parameter, over which walks count as linear
+MIN_PRIOR_GAIN: Final = 1e-3  # a walk that reduces a prior's variance by a smaller fraction counts as uninformative
+STRONG_PULL: Final = 3.0  # a bound or prior that is off by more standard deviations than this contradicts the walk
+LINEAR_MOVE: Final = 0.3  # largest change of a parameter, relative to its scale, for which walks count as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
 PROMISING_GAIN: Final = 2.0  # fit again if, at unchanged noise, the log-likelihood gains at least this
 FAR_FROM_CONFIG: Final = 10.0  # loss of log-likelihood beyond which a walk contradicts the config
 # Estimates agree with the config if its values lower the log-likelihood by less than this (two standard errors).
 NEAR_CONFIG: Final = 2.0
-MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
-SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
-RARE_GAIN: Final = 1e-3  # a gain is not due to chance if it is less probable than this under the right model
+MAX_FREED: Final = 3  # maximum number of parameters that are freed, one at a time
+SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, relative to its scale, that may explain the walk
+RARE_GAIN: Final = 1e-3  # a gain is real if chance alone would give one as large with less than this probability
 REJECTED: Final = 0.05  # probability below which a simpler explanation counts as rejected
 UNBOUNDED: Final = (-math.inf, math.inf)
 KNOWN: Final = ("gravity_m_s2",)
@@ -160,7 +160,7 @@ def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None)
 
 
 def gait_start(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> Floats:
-    """Return the section coordinates (d,) of the gait where the map of `step_map_of` starts."""
+    """Return the section coordinates (d,) of the gait's state from which the map of `step_map_of` starts."""
     p: Any = family.start
     return step_map_of(subject, family).step(subject.z, p).z if steps_before(subject, family, leg) else subject.z
 
@@ -197,7 +197,7 @@ def identify_walk(
 
 
 def rank(answer: Identification) -> tuple[bool, float]:
-    """Return a sort key: results that fit rank above the others, and among equals the higher likelihood wins."""
+    """Return a sort key that puts results that fit above those that do not, and then sorts by likelihood."""
     verdict = answer.models[0]
     return verdict.usable, verdict.log_likelihood or -math.inf
 
@@ -470,7 +470,7 @@ def distance_from_config(keys: Sequence[str], fitted: Fitted) -> float:
 def changes_alone(
     subject: ModelUnderTest, keys: Sequence[str], others: Iterable[Fixed], fitted: Fitted
 ) -> Iterator[tuple[Any, Fixed, float]]:
-    """Yield each fixed parameter that explains a walk that contradicts the config, if it is the only one to change.
+    """Find each fixed parameter whose change alone explains why a walk contradicts the config.
 
     Yields the log-likelihood, the parameter, and the change in the scale of the parameter. All estimated parameters
     keep the config's values. If there are fewer than two of them, nothing is yielded.
@@ -490,10 +490,10 @@ def changes_alone(
 def gain_of_freeing(
     subject: ModelUnderTest, keys: Sequence[str], other: Fixed, rows: Reduced, fitted: Fitted
 ) -> tuple[float, float]:
-    """Return the gain of log-likelihood if one more parameter is estimated, and the change of this parameter in its
-    scale.
+    """Return how much the log-likelihood rises if one more parameter is estimated, and how much this parameter changes,
+    in its scale.
 
-    Both are those of a linearised step with new standard deviations or, if the step is long, of a new fit.
+    Both come from a linearised step with new standard deviations or, if that step is long, from a new fit.
 
     rows  data of the walk, with the derivative for one more parameter
     """
@@ -545,7 +545,11 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. For a length or inertia of zero, return 1 % of that of a leg, for any other zero 0."""
+    """Return 1 % of a parameter.
+
+    If it is zero, return 1 % of the leg length for a length, of mass times leg length squared for an inertia, and
+    otherwise 0.
+    """
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -572,7 +576,7 @@ def keys_read_by(model: str, config: Config) -> tuple[str, ...]:
 def fixed_parameters(
     subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
 ) -> Iterator[Fixed]:
-    """Yield every fixed parameter, and for angles every nuisance that is not estimated.
+    """Yield every fixed parameter and, if angles were measured, every nuisance that is not estimated.
 
     Parameters for which no walk can be predicted at changed values are left out.
     """

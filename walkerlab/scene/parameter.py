@@ -38,7 +38,7 @@ class Parameter:
         return config_with(config, (self,), (value,))
 
     def refusal(self, config: reads.ContactConfig, value: float, key: Key) -> ConfigError:
-        """Build the error for a value that the config key `key` requests and the schema rejects, with the reason."""
+        """Build the error for a value that the schema rejects, with the reason. The config key `key` requests it."""
         why = ""
         try:
             _changed(config, (self,), (value,))
@@ -54,7 +54,7 @@ class Parameter:
         return ConfigError(f"{dotted(key)}: {self.key} cannot be {value:g} {self.unit}{why}", advice, key)
 
     def vary(self, config: reads.ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
-        """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""
+        """Return a function that calls `make` with the config at a value, or returns None if the schema rejects it."""
 
         def make_at_value(value: float) -> R | None:
             changed = self.config_at(config, value)

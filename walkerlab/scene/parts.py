@@ -124,7 +124,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 
 def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
-    """Return the parts of a walker without its torso and with two legs like leg 1."""
+    """Return the parts of a walker, leaving out any torso and building both legs like leg 1."""
     if isinstance(walker, walkers.CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))

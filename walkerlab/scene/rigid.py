@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 def foothold_heights(ground: contact.Footholds, steps: int) -> system.Floats | None:
-    """Return the heights (steps + 1,) in m of the footholds above the slope, from the start on, or None on even
-    ground."""
+    """Return the heights (steps + 1,) in m above the slope of the footholds at the start and after each step, or None
+    on even ground."""
     if ground.even:
         return None
     if ground.heights_m:
@@ -76,7 +76,7 @@ def rigid_walker(config: reads.RigidConfig, equations: "Equations | None" = None
 
 
 def add_drives(passive: RigidModel, config: reads.RigidConfig) -> RigidModel:
-    """Return the model with the push-off, hip spring and knee dampers of the config."""
+    """Return the model with the push-off, the hip's spring, damper and torque, and the knee dampers of the config."""
     drives = parts.drive_parameters(config)
     driven = passive.changed(**drives.shared)
     legs = [

@@ -1,4 +1,4 @@
-"""Describe how walks ended, and whether the ground, for example its pads, is the cause rather than the walker."""
+"""Describe how walks ended, and whether the cause is the walker or the ground, for example its pads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ GROUND_CAUSES: Final = {
     "contact.stiction_velocity.",
     "lifted-off": "The ground throws them up, or they start too fast: contact.stiffness, contact.damping.",
 }
-# Meanings of `contact.pad_pitch`, to append to a length.
+# What each `contact.pad_pitch` means, as text that follows the length.
 PITCH_SOURCES: Final = {"rigid": ", the rigid gait's step length", "own": ", the contact gait's step length"}
 Range = tuple[float, float]
 
@@ -66,7 +66,7 @@ def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads
 
 
 def ground_without_pads(config: ContactConfig) -> str:
-    """Return the --set text for ground without pads: plane if knees clear it, otherwise after-mid-swing."""
+    """Return the --set text for ground without pads: plane if knees let feet clear it, otherwise after-mid-swing."""
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 

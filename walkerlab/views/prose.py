@@ -1,4 +1,4 @@
-"""Render texts from Jinja templates, which have a file for each subject and a macro for each paragraph."""
+"""Render texts from Jinja templates. There is one file for each subject and one macro for each paragraph."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence

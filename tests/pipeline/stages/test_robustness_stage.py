@@ -95,7 +95,7 @@ def said_of(summary):
 
 def test_robustness_answer_is_in_plain_words(rigid):
     said = said_of(rigid.summary)
-    assert "still takes 50 steps after a step down of 14.37 mm or up of 5.977 mm" in said
+    assert "still takes 50 steps after a step that goes down by 14.37 mm or up by 5.977 mm" in said
     assert "On ground with 2 mm (s.d.) roughness the rigid model takes" in said
     assert "Most effective change (rigid model): decrease walker.hip_mass_kg by 1 %" in said
 
@@ -210,7 +210,7 @@ def test_missing_derivative_is_a_gap():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        (("robustness.roughness_m=[0.7]",), "more than half a leg"),
+        (("robustness.roughness_m=[0.7]",), "more than half the leg length"),
         (("robustness.to=[walker.thigh.mass_kg]",), "walker.thigh.mass_kg"),
         (("robustness.to=[strides]",), "affects no model"),
         (("robustness.to=[contact.stiffness]", "robustness.model=rigid"), "does not affect the rigid model"),

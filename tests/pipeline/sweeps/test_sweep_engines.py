@@ -399,7 +399,7 @@ def test_pickled_jobs_are_private(tmp_path):
     assert stat.S_IMODE((jobs / "earlier.pkl").stat().st_mode) == 0o600
     assert not (jobs / "foreign.pkl").exists()
     run.chmod(0o777)
-    with pytest.raises(ConfigError, match="is open to other users") as refused:
+    with pytest.raises(ConfigError, match="is writable by others") as refused:
         ENGINES["slurm"].opened(EngineOptions(folder=run, options=local)).__enter__()
     assert f"chmod o-w {run}" in refused.value.advice
 

@@ -34,12 +34,12 @@ from walkerlab.pipeline.store.files import Checkpoint, Numbers
 from walkerlab.scene.omissions import omission
 from walkerlab.scene.rigid import rigid_walker
 
-# The sizes of runs below are counted in right-hand sides.
+# The run sizes below are numbers of right-hand-side evaluations.
 RUN_BUDGET = 200_000  # limit of a compiled run, so that hopeless runs end
 # The steps of a library run in Python, so a right-hand side takes a hundred times as long.
 LIBRARY_RUN_BUDGET = 20_000  # limit of a run with a library
 LAST_RUN_SIZE = 12_000  # a library is not run at tighter tolerances once a run reaches this size
-WARM_UP_BUDGET = 2_000  # enough for everything to be compiled and loaded
+WARM_UP_BUDGET = 2_000  # enough right-hand sides to compile and load everything
 MAX_REPEATS = 7
 REPEAT_TIME_S = 0.2  # time for all repeats of a run
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))

@@ -11,7 +11,7 @@ STAGES = (
     ),
     Stage(
         "engines", "walkerlab.evidence.benchmarks.engines.stage",
-        "Simulate the walk in MuJoCo, Drake and Exudyn: our contact law in their integrators, then their own contact.",
+        "Simulate the walk in MuJoCo, Drake and Exudyn, first with our contact law, then with their native contact.",
         reads.SceneConfig, gait_for_start_or_pads, requires=("contact",), only_by="engines", shown_by=DRAWINGS,
         depends_on=dependency("programs", "walkerlab.evidence.benchmarks.engines.registry:installed_versions"),
     ),

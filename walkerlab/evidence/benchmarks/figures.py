@@ -176,7 +176,7 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Plot the last period over step size on native contact, with lines for ADAMS's law and the rigid gait."""
+    """Plot the last step's period over the time step on native contact. ADAMS's law and the rigid gait are lines."""
     figure, axes = panels(4.2)
     all_series = list(engine_series(scene, OWN_LAW, results))
     summary = results[ENGINES_STAGE].summary

@@ -17,7 +17,8 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import Numbers
 
 TAYLOR_METHOD = "heyoka-taylor"
-STOPPED_BY_EVENT = -1  # code of heyoka for a stop at the first terminal event. Failures and time limits have others
+# heyoka's return code for a stop at the first terminal event. Failures and time limits have other codes.
+STOPPED_BY_EVENT = -1
 
 
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
@@ -92,7 +93,7 @@ class End:
 
 @dataclass(frozen=True)
 class Reference:
-    """End states of a walk by two different methods. Their difference is the uncertainty."""
+    """End states of one walk, computed by two different methods. Their difference is the uncertainty."""
 
     first: End
     second: End
@@ -108,7 +109,7 @@ class Reference:
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def reference_for(self, method: str) -> End:
-        """Return the end state with which to compare a method. It was computed by another method."""
+        """Return the end state to compare a method with, computed by another method."""
         return self.second if method == self.first.method else self.first
 
 

@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
 
-SAME_ROUTE: Final = 1e-10  # both models agree if they differ by less than this, with L and g of 1
+SAME_ROUTE: Final = 1e-10  # both models agree if they differ by less than this, with L and g set to 1
 SAME_GAIT: Final = 1e-6  # starts that differ by less than this belong to the same gait
 SMALL_VALUE: Final = 1e-3  # differences are relative for printed values above this, and absolute below
 GAIT_VALUES: Final = (
@@ -61,7 +61,7 @@ def printed_states(check: Check) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Checked:
-    """A printed gait and the right gaits of its walker."""
+    """A printed gait and the correct gaits of its walker."""
 
     config: CheckConfig
     check: Check
@@ -102,7 +102,7 @@ class Checked:
         return printed or stated(self.check, 2 * len(self.check.angles.order or (0, 0)), 3)
 
     def printed_state(self, name: str, known: Floats) -> tuple[Floats, Floats] | None:
-        """Return a printed state of all bodies, and its change if each number changes by a unit of its last digit.
+        """Return a printed state of all bodies, and its change if each number changes by one unit in its last digit.
 
         Values that are not printed are taken from the state `known`. Return None if the state is not printed.
         """
@@ -117,7 +117,7 @@ class Checked:
 
     @cached_property
     def gaits(self) -> dict[CheckedStep, dict[str, Any]]:
-        """The right gaits with their values from the compiled model. The gait that `fixedpoint` reports comes first."""
+        """The correct gaits, with values from the compiled model. The gait that `fixedpoint` reports comes first."""
         names = state_names(self.config)
         found = {}
         # False sorts before True, so the reported gait comes first.
@@ -131,7 +131,7 @@ class Checked:
 
     @cached_property
     def right(self) -> CheckedStep:
-        """The right gait nearest to the printed one."""
+        """The correct gait nearest to the printed one."""
         nearest = min(self.gaits, key=self.distance)
         printed = self.printed_state("state", plain.full_state(self.walker, nearest.start))
         start = None if printed is None else plain.start_from(self.walker, printed[0], self.convention.instant)
@@ -143,7 +143,7 @@ class Checked:
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
     def values(self, gait: CheckedStep) -> Values:
-        """Return a gait's values of all printed numbers, in the printed convention."""
+        """Return a gait's values for all the printed numbers, in the printed convention."""
         return gait.values(self.items, self.convention, self.gaits.get(gait, {}))
 
     def distance(self, gait: CheckedStep) -> float:
@@ -157,7 +157,7 @@ class Checked:
 
     @cached_property
     def question(self) -> Question:
-        """The printed values that an explanation must reproduce: those that the plain model computes."""
+        """The printed values that the plain model can compute. An explanation must reproduce these."""
         values = self.right.values(self.items, self.convention)
         items = [item for item in self.items if values[item.name] is not None]
         printed = self.printed_state("state", plain.full_state(self.walker, self.right.start))
@@ -177,7 +177,7 @@ class Checked:
 class PrintedStep(NamedTuple):
     """An exact step from a printed state."""
 
-    start: Floats | None  # coordinates just after a heel strike, or None if the state leads to none
+    start: Floats | None  # coordinates just after a heel strike, or None if the state does not lead to one
     step: PlainStep | None
     rounding: Floats  # change of the start that is due to the rounding of the printed state
 
@@ -339,7 +339,7 @@ def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
 
 
 def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
-    """Describe the right gait that is nearest to the printed one."""
+    """Describe the correct gait that is nearest to the printed one."""
     names = ("period_s", "step_length_m", "multipliers", "spectral_radius")
     measured = checked.gaits.get(gait, {})
     values = {name: measured[name] if name in measured else gait.quantity(name) for name in names}

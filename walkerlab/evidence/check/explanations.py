@@ -25,17 +25,17 @@ from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, Mistake,
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
-MAX_SOLVED: Final = 5  # number of candidates whose gaits are solved
-FARTHEST_GUESS = 0.3  # rad, distance from the printed state above which a first guess has no meaning
+MAX_SOLVED: Final = 5  # maximum number of candidates whose gaits are computed
+FARTHEST_GUESS = 0.3  # rad, distance from the printed state above which a first guess makes no sense
 SAME_GUESS = 1e-7  # a candidate that changes the first guess by less than this (relative) is skipped
 # maximum number of rounds in which the size of a mistake is fitted, and the factor by which the fit must reduce the
 # largest deviation from the printed values
 FITTING_ROUNDS, MIN_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
-SIZE_SHARE = 0.03  # a round size is tried if it is this close to the fitted one (relative)
+SIZE_SHARE = 0.03  # a round number is tried as the size if it is this close to the fitted size (relative)
 MIN_REPRODUCED = 3  # an explanation must reproduce at least this many printed numbers, or all if fewer are printed
 MUCH_CLOSER = 5.0  # a cause is reported only if it brings gaits this many times closer to the printed values
-READINGS = 3  # number of other conventions in which we search for mistakes
+READINGS = 3  # number of other conventions under which we search for mistakes
 # Conventions whose deviation is at most this multiple of the smallest one are ranked by their number of changes.
 NEAR_FACTOR = 4.0
 CONVERGED: Final = 1e-6  # a fit ends when its value changes by less than this (relative)
@@ -52,7 +52,7 @@ class Candidate(NamedTuple):
     kind: str  # mistake or misprint
     what: str  # completes the sentence 'All printed values follow if ...'
     walker: PlainWalker
-    family: str = ""  # the mistake without its size, if it has one
+    family: str = ""  # description of the mistake without its size; empty if it has no size
 
 
 def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
@@ -96,7 +96,7 @@ def list_misprints(key: str, value: float, values: Mapping[str, float]) -> list[
 
 
 def transpose_digits(value: float) -> Iterator[float]:
-    """Yield the numbers that differ from `value` by an exchange of two neighbouring digits."""
+    """Yield the numbers obtained from `value` by swapping two neighbouring digits."""
     text = short_number(value)
     for place, (first, second) in enumerate(pairwise(text)):
         if first.isdigit() and second.isdigit() and first != second:
@@ -110,7 +110,7 @@ class Explanation:
     kind: str  # convention, mistake or misprint
     what: str  # completes the sentence 'All printed values follow if ...'
     reproduces: tuple[str, ...]  # names of the printed numbers that follow from it
-    digits: int  # smallest number of digits of these numbers
+    digits: int  # number of digits of the least precise of these numbers
 
 
 Attempt = tuple[Candidate, CheckedStep]
@@ -119,14 +119,14 @@ Attempt = tuple[Candidate, CheckedStep]
 
 @dataclass(frozen=True)
 class Question:
-    """Printed numbers that the plain model can compute, and the right gait."""
+    """Printed numbers that the plain model can compute, and the correct gait."""
 
     config: RigidConfig
     items: Sequence[Item]
     convention: Convention
     right: CheckedStep
     state: Floats | None  # printed state of all bodies, or None if no state is printed
-    gaits: Sequence[CheckedStep] = ()  # all right gaits
+    gaits: Sequence[CheckedStep] = ()  # all correct gaits
 
     @property
     def walker(self) -> PlainWalker:
@@ -193,8 +193,8 @@ class Question:
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a first guess of a walker's gait, by one Newton step.
 
-        The step begins at the printed state or, if no state is printed, at the start of the right gait. Returns None if
-        it leads nowhere.
+        The step begins at the printed state or, if no state is printed, at the start of the correct gait. Returns None
+        if it leads nowhere.
         """
         instant = self.convention.instant
         start = self.right.start if self.state is None else plain.start_from(walker, self.state, instant)
@@ -252,10 +252,10 @@ def explain_by_gaits(question: Question, attempts: Iterator[Attempt] | Sequence[
 
 
 def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions that fit the printed values better than the stated one, with the question in that convention.
+    """Yield each convention that fits the printed values better than the stated one, and the question restated in it.
 
-    A convention must bring the right gait much closer to the printed values, or at least closer if it puts both feet on
-    the slope and the stated one does not.
+    A convention must bring the correct gait much closer to the printed values, or at least closer if it puts both feet
+    on the slope and the stated one does not.
     """
     if question.state is None:
         return
@@ -264,7 +264,7 @@ def find_closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     far = question.miss(question.right, question.exact_items)
     readings: dict[Any, tuple[float, Convention]] = {}
     for other in alternatives(question.convention):
-        # If the right gait has the same values in several conventions, keep the first, which has the fewest changes.
+        # If the correct gait has the same values in several conventions, keep the first, which has the fewest changes.
         values = question.right.values(question.exact_items, other)
         miss = max(item.miss(values[item.name]) for item in question.exact_items)
         if miss < far:
@@ -302,7 +302,7 @@ def attempt_all(question: Question) -> Iterator[Attempt]:
         guess = question.guess(candidate.walker)
         if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_GUESS, SAME_GUESS)):
             guesses.append((question.miss(guess, question.quick_items), place, guess))
-    # The index decides between equal distances, because guesses cannot be compared.
+    # The index breaks ties, because guesses cannot be compared.
     for _, place, guess in heapq.nsmallest(MAX_SOLVED, guesses):
         yield from question.attempt(candidates[place], guess)
     if len(question.items) < MIN_REPRODUCED:
@@ -318,7 +318,7 @@ class FittedSize(NamedTuple):
 
     value: float
     change: float  # relative change of the value in the last round
-    without: float  # largest distance at the first value, in units of last digits
+    without: float  # largest distance from the printed values at `begin`, in units of their last digits
     left: float  # predicted largest distance after the fit, if gaits change in proportion to the parameter
 
 
@@ -352,9 +352,9 @@ def fit(
 
 
 def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
-    """Fit the size of a mistake to the printed values, and yield round sizes near the result, then the result.
+    """Fit the size of a mistake to the printed values. Yield round sizes near the fitted one, then the fitted one.
 
-    Yield nothing if the mistake does not come much closer than the right gait.
+    Yield nothing if the mistake does not come much closer than the correct gait.
     """
     fitted = fit(question, mistake.of_size, 0.0, mistake.first, mistake.limits)
     if fitted is None or fitted.left * MIN_GAIN > fitted.without:
@@ -369,9 +369,9 @@ def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
 
 
 def find_strike_at_start(question: Question) -> Iterator[Explanation]:
-    """Yield the explanation that a script detects the heel strike at which it starts.
+    """Yield the explanation that the integration starts at a heel strike and detects that strike again at once.
 
-    A multiplier of -1 must be printed, and the gait must reproduce all other values.
+    It applies only if a multiplier of -1 is printed and the gait reproduces all other values.
     """
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
@@ -381,7 +381,7 @@ def find_strike_at_start(question: Question) -> Iterator[Explanation]:
 
 
 def find_conventions(question: Question) -> Iterator[Explanation]:
-    """Yield other conventions under which the right gait has every printed digit.
+    """Yield other conventions under which the correct gait reproduces every printed digit.
 
     Only those with the fewest changes are kept.
     """
@@ -400,7 +400,7 @@ def find_conventions(question: Question) -> Iterator[Explanation]:
 
 
 def list_right_gaits(question: Question) -> Iterator[tuple[str, CheckedStep]]:
-    """Yield right gaits with the change that each needs: none, or another reading of the stated leg length.
+    """Yield correct gaits with the change that each needs: none, or another reading of the stated leg length.
 
     The leg length may have been meant to include the foot's radius, or to exclude it.
     """
@@ -411,7 +411,7 @@ def list_right_gaits(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius
         other = replace(walker, foot=foot)
-        # The search has no meaning for a foot above the hip.
+        # The search makes no sense for a foot above the hip.
         gaits = (gait_near(other, start) for start in starts if foot.imag < 0.0)
         for gait in [*filter(None, gaits)][:1]:
             yield f"the stated leg length {how} the foot's radius", gait

@@ -1,6 +1,6 @@
 """Gaits of plain walkers, and their values in the conventions in which they are printed.
 
-A convention says how to read a printed state: the order and origin of the angles, its instant, and the units.
+A convention says how to read a printed state: its instant, the order and origin of the angles, and the units.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DEFAULT_ORDERS: Final = {2: ("stance",), 4: ("swing", "stance"), 6: ("swing", "s
 GRAVITIES: Final = (1.0, 9.8, 9.81, 10.0)
 SCALED: Final = "sqrt(L/g)"
 RAD_IN_DEG: Final = math.degrees(1.0)
-# The feet count as on the slope if they are within this distance, in units of the last digit.
+# The feet count as standing on the slope if they are within this distance of it, in units of the last digit.
 FEET_DIGITS = 5.0
 CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
     "origin": ("angles are measured from {}", {"vertical": "the vertical", "slope-normal": "the slope’s normal"}),
@@ -120,7 +120,7 @@ class Convention:
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
         K = self.rows(n)
         tilt = walker.slope if self.origin == "vertical" else 0.0
-        # Bodies that are not printed keep their known motion, which makes the system square.
+        # Bodies without printed numbers keep their known motion. This makes the system square.
         free = [body for body in range(n) if not K[:, body].any()]
         square = np.vstack((K, np.eye(n)[free]))
         state = known.copy()
@@ -174,9 +174,9 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
 
 
 def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
-    """Return the convention with the sign of a relative angle that puts both feet of the printed state on the slope.
+    """Return the convention, with the sign of a relative angle chosen so that both printed feet are on the slope.
 
-    Return it unchanged if the angle is not relative, or if neither sign does.
+    Return it unchanged if the angle is not relative, or if neither sign puts them there.
     """
     if convention.second != "relative" or len(convention.order) < 2 or convention.stands(walker, items):
         return convention
@@ -247,7 +247,7 @@ class CheckedStep:
     def values(
         self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] | None = None
     ) -> Values:
-        """Return the right value of each printed number in the given convention, or None if no model computes it.
+        """Return the correct value of each printed number in the given convention, or None if no model computes it.
 
         measured  values of the compiled model by name, which replace those of the plain one
         """

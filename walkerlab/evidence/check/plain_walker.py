@@ -37,10 +37,10 @@ SHANK = 2
 TORSO = 3
 ROLLING = 4
 EXACT, QUICK = 1e-12, 1e-7  # relative tolerances for gaits and for first guesses
-LONGEST_SWING = 12.0  # sqrt(L/g), after which a swing is given up
+LONGEST_SWING = 12.0  # longest swing that is simulated, in sqrt(L/g)
 FALLEN = 1.5  # rad, angle of the stance leg at which the walker has fallen
 MAX_EULER_STEPS = 400_000
-LARGEST_STEP = 0.3  # sqrt(L/g), largest step of the integration
+LARGEST_STEP = 0.3  # largest integration step, in sqrt(L/g)
 LOCATING_ROUNDS = 4  # Newton iterations that locate an event
 SLOPE_STEP = 1e-7  # s, step of the finite difference for the slope of an event function
 STRAIGHT = "straight"
@@ -84,12 +84,13 @@ class PlainWalker:
     # mistakes
     signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors for velocity terms, by phase
     keeps_trailing_rate: bool = False
-    # weights of the trailing and leading legs' rates in a mistaken extra term, I * rate, of the balance at a strike
+    # weights of the trailing and leading legs' rates in a term I * rate that is added by mistake to the balance at a
+    # strike
     extra_inertia: tuple[float, float] = (0.0, 0.0)
-    strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
+    strike_foot: complex | None = None  # m, from the hip to the point about which the leading leg turns at the strike
     # whether the trailing leg turned about the same point of its foot before the strike
     turned_about_strike_foot: bool = False
-    strike_inertia: float = 1.0  # factor applied to the legs' inertia in the strike
+    strike_inertia: float = 1.0  # factor applied to the legs' inertia at the strike
     window: float = 0.0  # rad, how early a touch is accepted
     euler_step: float = 0.0  # s, step of Euler's method, or 0 for exact integration
     interpolates: bool = True  # whether Euler's method finds the strike between two steps
@@ -151,7 +152,10 @@ class PlainWalker:
 
     @cached_property
     def moments(self) -> Complex:
-        """Sum over all masses of mass times two levers (bodies, bodies), plus the inertias of the bodies (kg m^2)."""
+        """Sum over all masses of mass times the levers of two bodies (bodies, bodies), in kg m^2.
+
+        The diagonal includes the bodies' inertias.
+        """
         return np.asarray(self.levers.conj().T * self.masses @ self.levers + np.diag(self.inertias))
 
     @cached_property
@@ -226,7 +230,7 @@ def energy(walker: PlainWalker, state: Floats) -> float:
 
 
 def full_state(walker: PlainWalker, coordinates: Floats) -> Floats:
-    """Convert coordinates with a straight swing leg to the angles and then the rates of all bodies."""
+    """Convert coordinates with a straight swing leg to the state of all bodies: first the angles, then the rates."""
     if not walker.kneed:
         return coordinates[:4]
     shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
@@ -332,9 +336,9 @@ class PlainStep(NamedTuple):
 
 
 def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats | None:
-    """Return the coordinates just after the heel strike at which a state is printed.
+    """Return the coordinates just after the heel strike that a printed state belongs to.
 
-    For a state in mid-stance, use the next heel strike. Return None if the walker does not reach it.
+    For a state in mid-stance, this is the next heel strike. Return None if the walker does not reach it.
 
     instant  instant at which the walker is in the state
     """
@@ -499,7 +503,7 @@ class Mistake(NamedTuple):
     what: str  # completes the sentence 'All printed values follow if ...', where {} stands for the size
     of_size: Callable[[float], PlainWalker]  # builds the walker with a mistake of this size
     first: float = 0.0  # first guess of the size, or 0 if the mistake has no size
-    # smallest size (a smaller mistake hides in the errors of a program) and largest size
+    # smallest and largest size. A smaller mistake would be lost in a program's numerical error.
     limits: tuple[float, float] = (0.0, 0.0)
 
 
@@ -547,7 +551,7 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
-    """Yield groups of velocity terms in the equations of motion that may share a wrong sign, and describe them."""
+    """Yield groups of velocity terms in the equations of motion that may all have the wrong sign, with descriptions."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
         bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}

@@ -14,9 +14,9 @@ UNEXPLAINED = "different, unexplained"
 # A value counts as reproduced if at least this many of its digits agree, and at least half of them.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
-"""Numerical errors of the correct values, by quantity. `EXACT_ERROR` is that of all other quantities."""
+"""Numerical errors of the correct values of these quantities. For all others it is `EXACT_ERROR`."""
 EXACT_ERROR = 2e-12  # numerical error of the correct values, absolute below 1 and relative above
-MORE_DIGITS: Final = 2  # number of digits that we show of a correct value beyond the printed ones
+MORE_DIGITS: Final = 2  # a correct value is shown with this many more digits than printed
 MOST_DECIMALS: Final = 12
 
 
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
     EXPLAINED = "explained"
     CONTRADICTED = "contradicted"  # only in the study: other values of the paper contradict it
     DIFFERENT = "different"
-    NOT_REPRODUCED = "not-reproduced"  # only in the study: different and unexplained, or not comparable
+    NOT_REPRODUCED = "not-reproduced"  # only in the study: differs without an explanation, or cannot be compared
     NOT_COMPARABLE = "not-comparable"
 
 

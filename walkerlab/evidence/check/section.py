@@ -15,8 +15,8 @@ TONES: Mapping[str, Tone] = {
     Verdict.DIFFERENT: "bad", Verdict.NOT_REPRODUCED: "plain", Verdict.NOT_COMPARABLE: "plain",
 }  # fmt: skip
 """Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
-MANY_UNITS = 1e5  # a larger difference, in units of the last digit, is not shown
-LONGEST_LIST = 2  # a longer state is named as a whole if all its values are to be named
+MANY_UNITS = 1e5  # differences above this, in units of the last digit, are not shown
+LONGEST_LIST = 2  # a state with more values than this is one item of a list that has them all
 COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),

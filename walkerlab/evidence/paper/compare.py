@@ -333,7 +333,7 @@ def compare_with_paper(
 
 
 def summarise_models(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
-    """Summarise the walks of both models and, for kneed walkers, those for each moment of releasing the knee."""
+    """Summarise the walks of both models and, for kneed walkers, the walks with each moment of knee release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
     step_of = mean_step if have_different_legs(config) else last_step
@@ -356,7 +356,7 @@ def summarise_models(config: CompareConfig, inputs: Mapping[str, Content]) -> di
 
 
 def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison) -> Measured:
-    """Make the measurements with which the numbers of the paper are compared."""
+    """Compute the values to compare with the numbers in the paper."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     gaits = {name: sets[name] for name in EQUATION_SETS if "state" in sets.get(name, {})}
     models: dict[str, RigidMeasurements] = {

@@ -17,7 +17,7 @@ TIME_LOOK: Final = Look("difference at the same time", VERMILLION, (0.0, (3.2, 1
 PHASE_LOOK: Final = Look("at the same phase of a step", BLACK, "-", 1.2, "", order=4)
 PAPER_ERROR: Final = Look("largest error in the paper", GREY, ":", 1.6, "", order=2)
 AXIS_MARGIN = 3.0
-"""Factor between the extreme errors and the ends of the axis."""
+"""Factor by which the axis extends beyond the extreme errors."""
 ZERO_CROSSING = 1e-3
 """Smallest error shown, as a fraction of the largest. Where the difference changes sign, errors fall to zero."""
 LEG_QUANTITIES = (("a", "angle", "angle_error_rad"), ("b", "angular velocity", "velocity_error_rad_s"))
@@ -74,7 +74,7 @@ def draw_differences(results: Results) -> Drawn:
 
 
 def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str, float, str]]] | None:
-    """Return the name of the recorded walk and its largest differences from the rigid walk in phase.
+    """Return the name of the recorded walk and its largest differences from the rigid walk at the same phase.
 
     Return None if no walk was recorded.
     """

@@ -1,7 +1,7 @@
 """The parts of scenes that the study defines (see scene/studies.py): its walker, and the sign error of Appendix A.
 
-Results with the equations as printed depend on this file. The rest of the study is in other files, so that a change
-there does not make these results out of date.
+Results computed with the printed equations depend on this file. The rest of the study is in other files, so that a
+change there does not make these results out of date.
 """
 
 from typing import Any

@@ -45,7 +45,7 @@ class Characteristics:
     t_right: float | None  # period of the second step of that stride
     t_cycle: float | None  # sum of both periods
     v_com: float | None  # length of that stride along the slope, divided by t_cycle
-    # time mean of kinetic and potential energy over several steps, with heights from the current stance foot
+    # time average of kinetic plus potential energy over several steps, with heights from the current stance foot
     E_avg: float | None
 
 
@@ -62,7 +62,7 @@ def characteristics(periods: Array, lengths: Array, mean_energy: float | None) -
 
 @dataclass(frozen=True)
 class EnergyRecord:
-    """Time mean and extremes (J) of an energy."""
+    """Time average and extremes (J) of an energy."""
 
     mean: float
     least: float
@@ -126,7 +126,7 @@ class ContactMeasurements:
     table_3: Characteristics
     step_length: float | None  # m, mean over the last completed stride, or None if no stride was completed
     energy: EnergyRecord | None  # energy over the last five steps, or None if energies were not stored
-    from_x_p: tuple[int, str]  # walk of up to ten steps from the printed x_p: completed steps and outcome
+    from_x_p: tuple[int, str]  # completed steps and outcome of a walk of up to ten steps from the printed x_p
 
     @property
     def steps(self) -> int:
@@ -151,8 +151,8 @@ settled          as between_impacts, but only for the last completed stride
 class Departures:
     """How a scene differs from that of the paper, in words."""
 
-    rigid: tuple[str, ...]  # differences of the rigid model
-    contact: tuple[str, ...]  # differences of the contact model, including those of the rigid model
+    rigid: tuple[str, ...]  # differences that affect the rigid model
+    contact: tuple[str, ...]  # differences that affect the contact model, including those that affect the rigid model
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def describe(name: str, *values: Any) -> str:
     return f"{name} {used} instead of {paper}"
 
 
-FALLING = 4  # a cubic through this many last samples extrapolates the height of a falling hip
+FALLING = 4  # a cubic through this many samples at the end of a fall extrapolates when the hip reaches `FALLEN_HIP`
 
 
 @dataclass(frozen=True)
@@ -303,7 +303,7 @@ def adams_walk(
 ) -> AdamsWalk:
     """Simulate both models from the ADAMS start of Table 2.
 
-    The stance angle and the velocities are the printed ones. The swing angle puts both feet on the slope of the walker.
+    The stance angle and the velocities are the printed ones. The swing angle is chosen to put both feet on the slope.
 
     walk     function that simulates the contact model from a rigid start state, with samples
     terrain  terrain of the contact model, as named in the config

@@ -1,4 +1,4 @@
-"""Numbers printed in the paper, and what follows from them: the walker that they describe, and their contradictions.
+"""Numbers printed in the paper, the walker that they describe, and where they contradict each other.
 
 Numbers contradict each other only if their rounding does not explain the difference.
 """
@@ -152,7 +152,7 @@ def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
-    """Return the walker of Table 1 on the slope of x_p, with masses at mid-leg.
+    """Return the walker of Table 1, with masses at mid-leg, on the slope on which both feet of x_p stand.
 
     c21_sign  CORRECTED or AS_PRINTED
     """
@@ -235,7 +235,7 @@ def percent_left_open(row: StartRow) -> Interval:
 
 
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
-    """Yield steps of a period-one gait that are not equal, and cycles that differ from the sum of their steps."""
+    """Yield the steps of the period-1 gait if they are unequal, and cycles that differ from the sum of their steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
     if are_disjoint(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"
@@ -262,7 +262,7 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
             yield STEP_LENGTH, f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m"
         speed = getattr(V_COM, column)
         cycle = getattr(T_CYCLE, column)
-        # The speed may be that of one step per cycle, as in section 5, or of both steps of the cycle.
+        # The speed may count one step per cycle, as in section 5, or both.
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
         if are_disjoint((low, high), speed.rounding):
             speeds = f"one step is {length / cycle.value:.3f} m/s and two are {2.0 * length / cycle.value:.3f} m/s"

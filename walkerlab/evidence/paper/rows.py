@@ -33,7 +33,7 @@ verdict depends only on printed values.
 
 
 def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
-    """Count values by verdict. Until 0.3 is released, `refuted` also gives the sum of the last two."""
+    """Count values by verdict. Until 0.3 is released, `refuted` is the sum of the last two counts."""
     verdicts = Counter(row.verdict for row in rows)
     return {
         **{verdict.value: verdicts[verdict] for verdict in VERDICTS},
@@ -70,7 +70,7 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges the numbers of the paper by measurements on the scene of a config, and on the scene of the paper."""
+    """Judges the paper's numbers by measurements on two scenes: the config's and the paper's."""
 
     measured: Measured
     study: PaperStudy
@@ -147,7 +147,7 @@ class Judge:
         return self.row(entry, {}, value, verdict, "contact", text)
 
     def strides(self) -> Judged:
-        """Judge the five gait cycles. They are an input, because the rigid model is told to walk that many."""
+        """Judge the number of gait cycles. It is an input, because the rigid model walks as many as requested."""
         entry = printed.CYCLES_WALKED
         contact = self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}

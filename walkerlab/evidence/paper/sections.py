@@ -32,7 +32,7 @@ def numbers(results: page.Results) -> page.Section | None:
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
-    """Build the table of the numbers of the paper by location, with a column for each model that has values."""
+    """Tabulate the paper's numbers, grouped by location, with a column for each model that has values."""
     models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),

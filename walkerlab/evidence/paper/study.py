@@ -121,13 +121,13 @@ class PaperStudy:
     corrected: measured.RigidMeasurements
     # Table 3 for five gait cycles from the printed x_p, with the equations as printed
     from_x_p: measured.Characteristics
-    five_steps_energy: float  # J, time mean of the energy over the first five of the ten steps of `from_x_p`
+    five_steps_energy: float  # J, mean energy over the first five of the ten steps of `from_x_p`
     fastest: float  # rad/s, largest angular velocity of the gait as printed
     largest_jump: float  # rad/s, largest change of an angular velocity at the heel strike of this gait
     swing_foot_height: float  # m, height above the slope at which (A.55) as printed places the swing foot of x_p
     foothold_speed: float  # m/s, speed of the new stance foot if the printed gait's impact uses (A.55) as printed
     both_misprints: State | None  # fixed point near x_p with the misprints of (A.5) and (A.55), or None
-    # J, kinetic energy of one state, from the masses and from D_e with either order of coordinates
+    # J, kinetic energy of one state, computed from the masses and from D_e with either order of coordinates
     kinetic_energy: Mapping[str, float]
     adams: AdamsStart
 

@@ -1,4 +1,7 @@
-"""Stage `tune`: repeat the paper's adjustment for any walker, and report whether and why it is needed, and its size."""
+"""Stage `tune`: repeat the paper's adjustment for any walker.
+
+It reports whether the adjustment is needed, why, and how large it is.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -89,10 +92,10 @@ DISTANCE_LABELS = {
     "period_error_s": Label("s", "period of the contact gait minus the rigid gait's"),
     "length_error_m": Label("m", "step length of the contact gait minus the rigid gait's"),
     "numerical_period_s": Label("s", "change of the period at a ten times tighter tolerance"),
-    "angle_error_rad": Label("rad", "largest difference of an angle from the rigid walk in phase, between impacts"),
-    "velocity_error_rad_s": Label("rad/s", "largest difference of an angular velocity in phase, between impacts"),
-    "raw_angle_error_rad": Label("rad", "largest difference of an angle at the same time"),
-    "raw_velocity_error_rad_s": Label("rad/s", "largest difference of an angular velocity at the same time"),
+    "angle_error_rad": Label("rad", "largest difference in angle from the rigid walk at equal phase, between impacts"),
+    "velocity_error_rad_s": Label("rad/s", "largest difference in angular velocity at equal phase, between impacts"),
+    "raw_angle_error_rad": Label("rad", "largest difference in angle from the rigid walk at equal times"),
+    "raw_velocity_error_rad_s": Label("rad/s", "largest difference in angular velocity at equal times"),
     "numerical_time_s": Label("s", "change of the last touch's time if the tolerance is a hundred times tighter"),
     "rhs_evaluations": Label("1", "number of right-hand-side evaluations in the walk"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
@@ -103,7 +106,7 @@ DISTANCE_LABELS = {
 class LimitFindings:
     """Distances of the gaits and walks of each series from those of the rigid model, and the limit without creep."""
 
-    walk_series: tuple[str, ...]  # series in which whole walks are compared as well as gaits
+    walk_series: tuple[str, ...]  # series that compare whole walks, not only gaits
     rigid_period: float  # s, period of the rigid gait
     contact_period: float  # s, period of the contact gait
     series: dict[str, list[Distance]]
@@ -200,15 +203,16 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """Build a group for each series, with its settings and the distances of the gait and (if compared) of the walk from
-    the rigid ones.
+    """Build a group for each series: its settings, and how far the gait is from the rigid gait.
+
+    If walks were compared, the group also says how far the walk is from the rigid walk.
     """
     groups = {}
     text = "number of the setting, beginning with the config's contact"
     for series, rows in findings.series.items():
         if shown := [distance for distance in rows if distance.angle_error_rad is not None] or rows:
             settings = rows_group([row.setting for row in shown], FACTOR_LABELS, SETTING, text)
-            # Without a compared walk, its columns are missing.
+            # If no walk was compared, the columns of the comparison are missing.
             labels = {name: DISTANCE_LABELS[name] for name in DISTANCE_LABELS if getattr(shown[0], name) is not None}
             path = f"limit/{series.replace(', ', '-').replace(' ', '-')}"
             groups[path] = Group({**settings.variables, **columns(shown, labels, SETTING)})
@@ -275,7 +279,10 @@ class TuneRun:
         self.paper: AdamsWalk | None = None  # walk from the paper's ADAMS start, only for the paper's compass
 
     def find(self, progress: Progress, jobs: int) -> None:
-        """Run the procedure: walks, map, adjusted start and margins. For the paper's compass, also try its start."""
+        """Run the procedure: walks, map, adjusted start and margins.
+
+        For the paper's compass, also try its ADAMS start.
+        """
         settings = self.config.tune
         cells = settings.cells or (COMPASS_CELLS if self.pins_foot else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
@@ -302,9 +309,9 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Return the smallest change of the velocities with which the contact model walks, or None if it never does.
+        """Return the smallest change of the velocities that makes the contact model walk, or None if it never walks.
 
-        quick  the starts as simulated for the map
+        quick  the starts with the coarser solver settings of the map
         """
         cells = self.contact_map
         if self.as_it_stands.walks:

@@ -30,7 +30,7 @@ SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
 PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
     fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected")
 )
-"""Physically possible outcomes. A case whose outcome we cannot know accepts all. Then only its measures can fail."""
+"""Physically possible outcomes. A case whose outcome we cannot know accepts them all, so only its measures can fail."""
 STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
 SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
 CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
@@ -130,7 +130,7 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
 
 
 B = TypeVar("B", bound=Block)
-# leg (m), mass (kg) and gravity (m/s^2) of the twin, with uneven values so that rounding errors differ
+# leg (m), mass (kg) and gravity (m/s^2) of the twin. The values are not round, so that rounding errors differ.
 TWIN_LEG = 1.37
 TWIN_MASS = 11.3
 TWIN_GRAVITY = 7.43

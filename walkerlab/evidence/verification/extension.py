@@ -27,9 +27,7 @@ def paper_walks(_config: object) -> dict[str, Any]:
 
 
 def known_problems_and_start(config: reads.SceneConfig) -> tuple[str, ...]:
-    """Return the required stages: `known-problems` and, unless a study covers the walker, those that find a gait if one
-    is needed.
-    """
+    """Return the required stages: `known-problems` and, if no study covers the walker, any needed to find its gait."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 

@@ -75,7 +75,8 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     Return () for a walker other than a passive compass, for a case without a start or without motion, and for ground
     that needs events (a pinned foot, or `after-mid-swing`).
     """
-    # The lock of a knee is an event, and the script for rigid scenes covers only the walker of Appendix A.
+    # Knee locks are events, which ordinary methods do not handle, and the script for rigid scenes covers only the
+    # walker of Appendix A.
     if not is_passive_compass(config):
         return ()
     changes = {"steps": min(case.steps, COMPARED_STEPS), "budget": max(case.budget, MIN_REFERENCE_BUDGET)}
@@ -101,7 +102,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True)
 class Arrival:
-    """End of the walk of a case, with which other methods are compared."""
+    """End of a case's walk, with which the results of other methods are compared."""
 
     case: str
     time_s: float
@@ -136,7 +137,7 @@ def natural_units(config: RigidConfig) -> Floats:
 
 @contextmanager
 def suppress_warnings() -> Iterator[None]:
-    """Suppress the warnings of libraries, and the exceptions with which they give up."""
+    """Suppress the warnings of libraries, and the exceptions that they raise when they fail."""
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
@@ -300,9 +301,9 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Simulate a walk with other methods until one of them gives an answer.
+    """Simulate a walk with other methods until one of them succeeds.
 
-    budget  maximum number of right-hand sides; methods of libraries may get fewer
+    budget  maximum number of right-hand-side evaluations, which may be lower for libraries
     walk    function that simulates the walk with a method and a budget
     """
     tried: list[str] = []

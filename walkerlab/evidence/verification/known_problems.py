@@ -34,7 +34,8 @@ UNBOUNDED_M = 1e7
 OUT_OF_REACH: Position = (0.0, 1e3)  # m, position of an inactive foot
 PROBLEM_BUDGET = 2_000_000  # right-hand sides
 SAMPLE_COUNT = 4000
-BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # indices of the first body in the state
+# indices of the first body's coordinates and rates in the state
+BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6
 EARTH_GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
 PAPER_LAW: Final = Impact.from_contact(Contact().to_si())
@@ -88,7 +89,7 @@ def run_until(
     frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
     walk_state = new_walk_state(walker, JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame), 1, 1, start)
     walk_state.at_zero[:] = 0
-    # Date the last touch so that the rule that ends walks without heel strikes ends this run at `duration_s`.
+    # Set the time of the last touch so that the rule for walks without heel strikes ends this run at `duration_s`.
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
     times = np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
     observer = new_observer(walker, walk_state, start, times)
@@ -110,7 +111,7 @@ class Known:
     value: Annotated[float, Label("1", "value computed by the contact code, in the quantity's unit")]
     reference: Annotated[float, Label("1", "reference value, computed by another route, in the quantity's unit")]
     source: str
-    limit: float  # largest relative error, justified by `why_limit`
+    limit: float  # largest relative error that is accepted. `why_limit` gives the reason.
     why_limit: str
     wall_s: float
 
@@ -180,7 +181,7 @@ def restitution(law: Impact, speed: float) -> float:
 
 
 def block_speed(slope: float, start_speed: float) -> float:
-    """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
+    """Return the speed (m/s) of a block on a slope (rad) one second after it starts at `start_speed` (m/s)."""
     foot = PAPER_LAW.resting_foot(BLOCK_MASS * EARTH_GRAVITY * math.cos(slope), BLOCK_MASS)
     # The block starts at the depth at which it would rest, so that it neither falls nor bounces.
     block = rig(BLOCK_MASS, 1.0, PAPER_LAW, slope=slope)
@@ -221,7 +222,7 @@ ROD_STIFFNESS = 1.0e8
 
 
 def painleve_growth_rate() -> float:
-    """Compute the growth rate s (1/s) with which the end of a sliding rod digs in, from penetrations d.
+    """Compute from penetrations d the growth rate s (1/s) at which the end of a sliding rod digs in.
 
     For d = a + b cosh(s t), its differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """

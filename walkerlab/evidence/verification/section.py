@@ -1,4 +1,4 @@
-"""Report section on extreme cases, known problems and ordinary methods."""
+"""Report section on extreme cases, problems with known answers and ordinary methods."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -152,7 +152,7 @@ def stiction_group(cells: int, results: Mapping[str, Numbers]) -> Group:
 
 
 def step_group(cells: int, results: Mapping[str, Numbers]) -> Group:
-    """Build the group of results of semi-implicit Euler over step size and stiffness."""
+    """Build the group of results over step size and stiffness, computed with semi-implicit Euler."""
     # (stiffness, step size, 2): verdict and error
     cells_by_axis = np.array([np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)])
     verdicts, errors = cells_by_axis.transpose(2, 1, 0)

@@ -54,7 +54,7 @@ class Masses:
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
-        """Return positions (m) and velocities (m/s) of the masses from the reference point (..., masses, 2).
+        """Return positions (m) and velocities (m/s) of the masses (..., masses, 2) relative to the reference point.
 
         psi, rate  angles (rad) and rates (rad/s) of the bodies (..., bodies)
         """
@@ -142,7 +142,7 @@ class SwingMasses:
         """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
         The first is that of the walker about the new foothold. The second is that of the lifting leg about the hip,
-        including the share of the leg in coupled bodies.
+        including its share of bodies whose motion is coupled to the leg's, such as a torso.
 
         new  whether `moving` is the motion after the heel strike, when the legs have exchanged roles
         """
@@ -212,19 +212,19 @@ BALANCE_STEPS: Final = 2  # enough for an impact and the motion after it
 INITIAL_INTERVALS: Final = 256
 MAX_PASSES: Final = 9  # limit on refinements, each of which splits unsettled intervals into four
 MAX_INTERVALS: Final = 30_000  # a grid with more intervals is not refined further
-# Largest total error of the impulse, as a fraction of the walker's momentum. Each interval may have an equal part.
+# Largest total error of the impulse, as a fraction of the walker's momentum. Each interval may have an equal share.
 SETTLED_IMPULSE_SHARE: Final = 1e-6
-# A balance in which more of the impulse is unknown is inconclusive (fraction of the walker's momentum).
+# A balance is inconclusive if the unknown part of the impulse exceeds this fraction of the walker's momentum.
 MAX_UNKNOWN: Final = 1e-3
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Result of a momentum balance, in fractions of the walker's momentum."""
+    """Result of a momentum balance, as fractions of the walker's momentum."""
 
     residual: float  # largest difference between momentum change and impulse, over time and components
-    unsure: float  # estimated error of the integration of the impulse
-    unresolved: float  # error of the impulse of friction, because slip velocities are known only to the tolerance
+    unsure: float  # estimated error of the integrated impulse
+    unresolved: float  # error of the friction impulse, because slip velocities are known only to within the tolerance
     steps: int  # solver steps
 
 
@@ -351,7 +351,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
-    """Return the momentum along and normal to the slope (kg m/s) and about a point of the slope (kg m^2/s).
+    """Return the momentum along and normal to the slope (kg m/s) and about a point on the slope (kg m^2/s).
 
     It has the shape (ends, 3): the midpoints of the intervals are left out.
     """
@@ -372,7 +372,7 @@ def cross(r: Floats, v: Floats) -> Floats:
 CENTRE_HEIGHT = 1  # index of the height of the centre of mass in the free walker's state
 STRIKE_TOLERANCE = 1e-9  # largest relative error at a heel strike
 SAMPLE_RATE = 40  # samples per pendulum time
-# Errors of quadrature may lower the dissipated energy, but by no more than this fraction of the allowed residual.
+# Quadrature errors may lower the dissipated energy, but by no more than this fraction of the allowed residual.
 REGAIN_TOLERANCE = 1e-3
 
 
@@ -403,7 +403,7 @@ class CaseStart:
     residual_name: ClassVar[str]  # description of `JudgedWalk.residual_J`
     config: WalksConfig
     start: State
-    energy: float  # J, m g L plus kinetic and elastic energy at the start, by which residuals are divided
+    energy: float  # J, scale of the residuals: m g L plus the kinetic and elastic energy at the start
 
     def tolerances(self, case: Case, tighter: float = 1.0) -> Tolerances:
         """Return the config's method and tolerances with the case's budget. `tighter` multiplies both tolerances."""
@@ -481,7 +481,7 @@ class ContactStart(CaseStart):
         return [Measure("energy regained from friction and damping", back, REGAIN_TOLERANCE * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
-        """Measure the momentum balance, unless the walk has no answer or no duration."""
+        """Measure the momentum balance, unless the walk has no definite outcome or ended at time 0."""
         if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
             return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
         return momentum_finding(self.config, self.scene, self.start, case)

@@ -30,7 +30,7 @@ LIKELIHOOD_TOLERANCE: Final = 1e-2
 # largest change of a converged unknown, in standard errors
 MOVE_TOLERANCE: Final = 0.1
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
-# smallest noise, as a fraction of a quantity's typical size; measurements without noise count as this noisy
+# smallest noise, as a fraction of a quantity's typical size; also used for measurements without noise
 NOISE_FLOOR: Final = 1e-6
 NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
@@ -269,7 +269,7 @@ def linearise(
 ) -> Linearised | None:
     """Linearise the prediction at u (unknowns,) and the disturbances, or return None if a walk ends early.
 
-    disturbances  heights (m), then any known kicks. The walk is predicted over these heights but without kicks
+    disturbances  heights (m), followed by the kicks if they are known. The prediction uses only the heights
     robust        scatter with which a robust loss trims the residuals, or None to leave them unchanged
     """
     forecast = problem.forecast
@@ -291,8 +291,7 @@ def linearise(
 
 
 def compute_pseudo_residuals(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
-    """Return pseudo-residuals (values,), with which least squares gives the same result as the soft_l1 loss with the
-    residuals.
+    """Return pseudo-residuals (values,). Least squares on them gives the same result as soft_l1 on the residuals.
 
     The derivative of the loss is psi(x) = x / sqrt(1 + x^2), where x are residuals in units of their scatter. Least
     squares on psi / mean(psi') has the fixed point and the covariance of the robust fit. Another factor corrects for

@@ -22,14 +22,15 @@ from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
-"""A parameter combination with a singular value below this is undetermined, because changes by its scale are lost in
-the noise.
+"""A parameter combination with a singular value below this is undetermined, because even a change as large as its
+scale is lost in the noise.
 """
 # A combination whose singular value is below this fraction of the largest one counts as having no effect at all.
 LOST_SHARE: Final = 1e-7
 NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
-# largest distance below and above the most likely value, in the logarithm of a standard deviation
+# The noise is examined at most this far below and above its most likely value, in the logarithm of its standard
+# deviation.
 FARTHEST_NOISE: Final = (3.0, 1.5)
 # A parameter is named if its component in an undetermined direction is at least this large, or if the direction moves
 # it by more than its standard error.
@@ -47,8 +48,8 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     result = replace(plain, freedom=freedom, contributions=contributions(fitted, basis))
     groups = fitted.forecast.half_steps
     if not groups.size:
-        # A short walk hardly shows whether floor or kicks disturbed it, and both have different effects on the
-        # estimates.
+        # A short walk hardly shows whether the floor or kicks disturbed it, and the two affect the estimates
+        # differently.
         average = average_covariance(fitted, likely_noises(fitted), basis)
         root = np.linalg.cholesky(likeliest)
         inverse = np.linalg.inv(root)
@@ -84,7 +85,7 @@ def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
     meat = root.T @ fitted.rows.prior[1:, 1:] @ root
     count = groups.max() + 1
     for rows in (groups == group for group in range(count)):
-        # The fit has followed the residuals of this group, so they are too small. The matrix corrects this.
+        # The fit has adapted to the data of this group, so its residuals are too small. The matrix corrects this.
         score = np.linalg.solve(np.eye(len(meat)) - J[rows].T @ J[rows], J[rows].T @ residuals[rows])
         meat += (1.0 - 1.0 / count) * np.outer(score, score)
     return widen(root, meat)
@@ -98,7 +99,7 @@ def widen(root: Floats, meat: Floats) -> Floats:
 
 
 def scale_covariance(covariance: Floats, scales: Floats) -> dict[str, Any]:
-    """Convert the covariance of scaled parameters to that of the parameters. Also return their correlations."""
+    """Convert the covariance of scaled parameters to that of the unscaled ones. Also return their correlations."""
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return {"covariance": covariance * np.outer(scales, scales), "correlations": covariance / np.outer(errors, errors)}
 
@@ -129,8 +130,9 @@ def effective_freedom(fitted: Fitted, largest: float, likeliest: Floats, basis: 
     largest    degrees of freedom if the standard deviations were known
     likeliest  covariance along the directions at the most likely standard deviations
 
-    A short walk determines the standard deviations of floor and measurement poorly. Averaged over their plausible
-    values, the covariance is nu / (nu - 2) times as large as at the most likely values, for nu degrees of freedom.
+    A short walk determines the standard deviations of the floor and of the measurements poorly. Averaged over their
+    plausible values, the covariance is nu / (nu - 2) times as large as at the most likely values, for nu degrees of
+    freedom.
     """
     if not len(basis):
         return largest
@@ -213,7 +215,7 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
         if not is_open(np.array([value, largest]))[0]:
             continue
         order = np.argsort(-np.abs(direction))
-        # The sign of a singular vector is arbitrary. The largest component is shown as a rise.
+        # The sign of a singular vector is arbitrary, so make the largest component positive.
         signed = direction * np.sign(direction[order[0]])
         moved = (np.abs(direction) * information.scales > errors) & (errors > 0.0)
         parts = [(information.keys[k], float(signed[k])) for k in order if moved[k] or abs(signed[k]) >= LOADED]

@@ -25,9 +25,10 @@ SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 NOTABLE_ALTERNATION: Final = 3.0  # smallest such difference for which the answer suggests fitting a key of leg 2
 PHASE_BINS: Final = 20
-# fraction of the leg length; the floor of a laboratory has about 0.001
+# fraction of the leg length; about 0.001 for a laboratory floor
 UNUSUALLY_ROUGH: Final = 0.003
-UNUSUAL_KICK: Final = 0.05  # largest ordinary change of the rates at a heel strike, as a fraction of the rates
+# Larger changes of the rates at a heel strike, as a fraction of the rates, are unusual.
+UNUSUAL_KICK: Final = 0.05
 # Largest acceptable scatter of averaged residuals, as a normal deviate. Of the walks that the model explains, 0.8 %
 # exceed it.
 MAX_DEPENDENCE: Final = 2.4
@@ -82,7 +83,7 @@ def alternates(fitted: Fitted) -> bool:
 
 
 def describe_limp(fitted: Fitted) -> str:
-    """Describe a quantity whose residuals alternate from step to step, or return '' if there is none."""
+    """Describe a quantity whose residuals alternate from step to step, or return '' if none does."""
     white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
     for quantity, alternation in alternations(fitted, white).items():
         if alternation > ALTERNATION:
@@ -115,7 +116,7 @@ def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
 
 
 def dependent_residuals(fitted: Fitted) -> Iterator[str]:
-    """Yield a reason to doubt the errors if averages over half steps scatter more than independent noise explains."""
+    """Yield a reason to doubt the standard errors if half-step averages scatter more than independent noise would."""
     # Angles compared at fractions of steps inherit the errors of the measured heel strikes.
     groups = fitted.forecast.half_steps
     if not groups.size:
@@ -151,7 +152,7 @@ def alternation_of(residuals: Floats) -> float:
 
 
 def phase_means(fitted: Fitted) -> Floats:
-    """Return the mean residual (phases, 2) of the angles at each phase, over the most probable floor.
+    """Return the mean residual (phases, 2) of the angles at each phase, for a walk on the most probable floor.
 
     The swing leg is column 0.
     """

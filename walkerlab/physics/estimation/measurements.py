@@ -31,7 +31,8 @@ class MeasuredWalk:
     # sum of the leg angles from the slope's normal at heel strikes; not zero if slope or sensors have an error
     touch_sum_rad: float = 0.0
     first_leg: int | None = None  # leg (1 or 2) that swings in the first step, or None if unknown
-    resolution: Mapping[str, float] = field(default_factory=dict)  # smallest decimal place of quantities, in SI units
+    # one unit in the last decimal place of each quantity, in SI units
+    resolution: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

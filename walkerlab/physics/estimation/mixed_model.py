@@ -1,6 +1,6 @@
 """Linear model of a disturbed walk: whitening, restricted likelihood of its standard deviations, and information.
 
-The floor's heights, and kicks that change the rates at heel strikes, disturb the walk. Noise disturbs its measurement.
+The walk is disturbed by floor heights and by kicks that change the rates at heel strikes, its measurement by noise.
 The values of each quantity are first reduced to as many rows as there are derivatives, so the cost of a likelihood does
 not depend on the number of samples.
 """
@@ -23,7 +23,7 @@ DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
 """Starts of the search: measurement noises as multiples of the current one, roughness as fractions of the leg length,
 and kicks as fractions of the rates.
 """
-# bounds on roughness and kicks, as the same fractions
+# bounds on roughness and kicks, as fractions of the same quantities
 DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)
 # fraction below which a disturbance cannot be distinguished from none
 NEGLIGIBLE_DISTURBANCE: Final = 1e-5
@@ -43,10 +43,10 @@ NOISE_SEARCH: Final = {"ftol": 1e-7, "gtol": 1e-2}
 MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
 MIN_GAINS: Final = (1e-6, 0.5)
-"""A disturbance by heights, or one that includes kicks, is kept only if it raises the log-likelihood by more
-than this.
+"""A disturbance model is kept only if it raises the log-likelihood by more than this. The first value is for heights
+alone, the second for models with kicks.
 """
-# eigenvalues of scaled information below this fraction of the largest are rounding errors
+# eigenvalues of the scaled information are rounding errors if they are below this fraction of the largest
 LOST_INFORMATION: Final = 1e-13
 
 
@@ -103,7 +103,8 @@ class Reduced(NamedTuple):
 
     fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
     G: Floats  # (rows, heights + kicks)
-    covariance: Floats  # (2, rows, rows) covariances of the rows due to heights, and due to kicks, of unit variance
+    # (2, rows, rows) covariances of the rows due to heights of unit variance, and due to kicks of unit variance
+    covariance: Floats
     quantity: NDArray[np.int64]  # (rows,)
     counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)
@@ -181,7 +182,7 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
 
 
 def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
-    """Return the logarithm of the prior density (...,) of noises, and its derivatives with respect to their logarithms.
+    """Return the log prior density (...,) of noise levels, and its derivatives with respect to their logarithms.
 
     deviations  (..., quantities) standard deviations of the measurement
     """
@@ -231,17 +232,17 @@ def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
-    """Return covariance and most likely change of the unknowns, the sum of squares after it, and a log-determinant.
+    """Return the covariance, most likely change of the unknowns, sum of squares after this change, and log-determinant.
 
     reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
-    The last value is the logarithm of the determinant of the information, from eigenvalues that exceed rounding errors.
+    The log-determinant is that of the information, from eigenvalues that exceed rounding errors.
     """
     score = reduced[..., 1:, 0]
     values, vectors = np.linalg.eigh(reduced[..., 1:, 1:])
     kept = values > LOST_INFORMATION * values.max(axis=-1, initial=0.0)[..., None]
     sizes = np.where(kept, values, 1.0)
-    # The products are taken in this order, because the covariance itself may be large and known to few digits only.
+    # The products are taken in this order because the covariance itself may be large and accurate to only a few digits.
     parts = np.einsum("...ij,...i->...j", vectors, score) * kept / sizes
     move = np.einsum("...ij,...j->...i", vectors, parts)
     covariance = (vectors * (kept / sizes)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
@@ -300,9 +301,9 @@ def estimate_noise(
 def climb(
     rows: Reduced, starts: Sequence[Floats], bounds: Floats, sources: tuple[int, ...], leg_length_m: float
 ) -> tuple[Floats, float]:
-    """Maximise the restricted likelihood over logarithms (see `noise_at`), and return them and the likelihood there.
+    """Maximise the restricted likelihood over the logarithms of the standard deviations (see `noise_at`).
 
-    The search starts from the likeliest of `starts`.
+    The search starts from the likeliest of `starts`. Returns the logarithms at the maximum and the likelihood there.
     """
     from scipy.optimize import minimize
 

@@ -28,16 +28,16 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """Properties of the clock and the sensors that can be estimated. For each: its value if it is not estimated, and a
 typical change."""
-# Directions of the start are dropped if changes along them have a smaller relative effect on the next step than this.
+# Drop directions of the start in which a change affects the next step by less than this (relative).
 MIN_EFFECT: Final = 1e-3
-LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as later than the last heel strike.
+LAST_INSTANT: Final = 1e-9  # Samples in this last fraction of a walk count as after the last heel strike.
 START_SCALE: Final = 0.02  # typical change of each section coordinate of the start
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
-QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
-EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
+QUICK_STEP: Final = 1e-6  # step for difference quotients during the search, as a fraction of an unknown's scale
+EXACT_STEP: Final = 1e-3  # the same, for difference quotients of the result
 # Replaces EXACT_STEP for sampled angles. A larger step would shift their kinks at heel strikes across sample times.
 SAMPLED_STEP: Final = 1e-5
-# number of cached predictions, since search, derivatives and checks request the same walks
+# number of predictions to cache, because the search, derivatives and checks request the same walks
 KEPT_PREDICTIONS: Final = 16
 
 
@@ -46,7 +46,7 @@ class Prediction(NamedTuple):
 
     values: Floats  # (values,) predicted values
     walk: DisturbedWalk
-    times_s: Floats  # (samples,) times of angle samples from the first heel strike of the walk
+    times_s: Floats  # (samples,) times of the angle samples since the first heel strike of the walk
     inside: NDArray[np.bool_]  # (samples,) whether each sample is within the walk
     angles_rad: Floats  # (samples, 2) predicted angles, before offset and gain of the sensors
 
@@ -81,7 +81,7 @@ class Readings:
 
     @cached_property
     def quantity(self) -> NDArray[np.int64]:
-        """Index (values,) of the quantity of each value."""
+        """Index (values,) of the quantity that each value measures."""
         sizes = [self.measured.count] * len(self.channels)
         sizes.append(self.measured.angles_rad.size)
         return np.repeat(np.arange(len(sizes)), sizes)
@@ -123,7 +123,7 @@ class Readings:
     def times_in_steps(self, durations: Floats) -> Floats:
         """Return the sample times (samples, ...), from the first heel strike, in steps of these durations (steps, ...).
 
-        With the measured periods, they are the times by the clock of the measurement. The times are linear in the
+        With the measured periods, these are the times on the measurement's own clock. The times are linear in the
         durations, so this also converts changes of durations to changes of times.
         """
         touches = np.concatenate((np.zeros_like(durations[:1]), np.cumsum(durations, axis=0)))
@@ -143,7 +143,7 @@ class Forecast(Readings):
     scales: Floats  # (parameters,) typical changes
     z: Floats  # (d,) section coordinates around which the start is searched for
     directions: Floats  # (d, starts) directions of the start that affect the next step
-    kicked: bool = False  # whether kicks disturb the walk besides the floor's heights
+    kicked: bool = False  # whether kicks disturb the walk in addition to the floor's heights
 
     @property
     def unknowns(self) -> int:

@@ -76,14 +76,14 @@ class Information:
     """Information in a walk about the fitted parameters."""
 
     keys: tuple[str, ...]
-    # (parameters,) singular values of the sensitivity to scaled parameters, in standard deviations of the data, with
-    # start and nuisances free
+    # (parameters,) singular values of the data's sensitivity to the scaled parameters, in standard deviations of the
+    # data; the start and the nuisances are free
     singular_values: Floats
     directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
     covariance: Floats  # (parameters, parameters) along determined directions, in the units of the parameters
     correlations: Floats  # (parameters, parameters) correlations of the estimates
     scales: Floats  # (parameters,) typical changes, in the units of the parameters
-    freedom: float  # degrees of freedom of the Student's t distribution of the errors
+    freedom: float  # degrees of freedom of Student's t distribution for the errors
     # fraction of the information due to each measured quantity, averaged over determined directions
     contributions: dict[str, float] = field(default_factory=dict)
 

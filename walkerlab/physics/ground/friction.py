@@ -2,8 +2,8 @@
 
 A law is a class that holds the law's parameters and has the members of `FrictionLaw`. It needs a case of
 `friction_coefficient` and, if its coefficient has several formulas, cases of `switching_count` and `sample_switching`.
-`FRICTION_LAWS` lists the built-in laws by name, and the `Extension` of a package lists its laws. No other file depends
-on the choice of law.
+`FRICTION_LAWS` lists the built-in laws by name, and the `Extension` of a package lists its laws. Apart from the export
+for ADAMS, which refuses the laws of packages, no other file depends on the choice of law.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from walkerlab.physics.ground.normal_force import smooth_step
 from walkerlab.physics.kernels import LawKind, dispatch_by_type, dispatch_by_type_or_default
 
-SLOPE_SAMPLES = 101  # number of slip velocities in the rising part of the coefficient, and in the falling part
+SLOPE_SAMPLES = 101  # number of slip velocities sampled in each part of the friction coefficient, rising and falling
 
 
 class FrictionLaw(Protocol):

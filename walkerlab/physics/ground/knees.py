@@ -71,7 +71,7 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     x = np.array(x, float)
     n = int(whole.bodies)
     p = int(whole.places)
-    # The bodies' rates are the last n entries, with and without coordinates of the root.
+    # The bodies' rates are the last n entries, whether or not the state has root coordinates.
     rates = x.size - n
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)

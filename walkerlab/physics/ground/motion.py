@@ -19,9 +19,9 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 
 @forced_inline
 def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Compute the force of ground and push-off on a foot, along and normal to the slope (N).
+    """Compute the force (N) of the ground and the push-off on a foot, along and normal to the slope.
 
-    The torques of this force are added to r (n,).
+    Adds the torques of this force to r (n,).
     """
     form = system.form
     push = push_on(system, t, foot, s, c)
@@ -46,9 +46,10 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 
 @forced_inline
 def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Compute forces of ground and push-off (N, along and normal to the slope), and write angular accelerations into r.
+    """Compute the ground and push-off forces (N, along and normal to the slope), and the angular accelerations.
 
-    Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
+    Writes the accelerations into r, sines and cosines of the angles into s and c, and the factors of the mass matrix
+    into M.
     """
     # First, r collects the torques of feet, hinges, stops, centrifugal forces and, in a pinned form, gravity.
     form = system.form

@@ -22,9 +22,9 @@ class Terrain(NamedTuple):
     """Ground, as created by `checkerboard`, `after_mid_swing` or `plane`."""
 
     pitch: float  # [S] m, length of a pad, and scale of the criteria for steps and slides
-    lanes: tuple[float, float]  # m, position along the slope of the centre of pad 0 in each foot's lane
+    lanes: tuple[float, float]  # m, where the centre of pad 0 in each foot's lane lies along the slope
     has_pads: bool  # whether the ground consists of pads, over whose edges a foot can trip; if not, it is a plane
-    order_matters: bool  # whether a foot can touch only after it was ahead of the other foot while above the ground
+    order_matters: bool  # whether a foot can touch only once it has been above the ground ahead of the other foot
     heights: Any  # (footholds,) m above the slope, from the start on; all further footholds have the last height
 
 
@@ -34,7 +34,7 @@ def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
 
 
 def after_mid_swing(pitch: float) -> Terrain:
-    """Create a plane that a foot can touch only after it was ahead of the other foot while above the ground."""
+    """Create a plane that a foot can touch only once it has been above the ground ahead of the other foot."""
     return Terrain(pitch, (0.0, 0.0), False, True, EVEN)
 
 
@@ -88,13 +88,16 @@ def has_ground_in_cell(cell: int) -> bool:
 
 @kernel_part
 def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
-    """Whether the ground carries a foot at the start: the stance foot always, the other unless `order_matters`."""
+    """Whether a foot has ground below it at the start. If `order_matters`, only the stance foot has."""
     return is_stance or not terrain.order_matters
 
 
 @kernel_part
 def has_ground_in_air(terrain: Terrain, has_ground: bool, stands: bool, ahead: bool) -> bool:
-    """Whether a foot in the air has ground below it. That may change on a plane where the order of the feet matters."""
+    """Whether a foot in the air has ground below it.
+
+    On a plane where the order of the feet matters, this can change while the foot is in the air.
+    """
     if terrain.has_pads:
         return has_ground
     return stands or ahead or not terrain.order_matters

@@ -38,8 +38,8 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers. Only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
-    # thigh, with equal indices while they are merged into one body, or if the leg has no knee and is always locked). E
-    # holds a single reduction.
+    # thigh). Both indices of a knee are equal while its bodies are merged into one, and in a leg without a knee,
+    # which is always locked. E holds a single reduction.
 
     bodies: int  # [n]
     places: int  # number of root coordinates before the angles: 2, or 0 for a pinned form
@@ -55,8 +55,8 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     hip_y: Floats
     push_offs: Floats  # (2,) N s, impulse of each foot's pulse; `push_off` is the larger one
     push_off_duration: float  # s
-    onto: Integers  # (bodies of the walker,) index in this form of each of the walker's bodies
-    first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies that it consists of
+    onto: Integers  # (bodies of the walker,) index of the body of this form that contains each of the walker's bodies
+    first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies that make it up
     root_height: float  # m, height of the hinge above the slope
 
     @property
@@ -104,7 +104,7 @@ class ContactWalker(NamedTuple):
 
     @property
     def gravity_down(self) -> float:
-        """Gravity towards the slope, m/s^2."""
+        """Component of gravity normal to the slope, positive into the ground, m/s^2."""
         return float(self.whole.gravity_down)
 
     @property
@@ -128,7 +128,7 @@ def changed_forms(walker: ContactWalker, **fields: Any) -> ContactWalker:
 
 @tree.fast_fields
 class WalkProgress(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    stance: int  # foot that carries the present step
+    stance: int  # stance foot of the present step
     steps: int  # number of completed steps
     last_touch: float  # s, time of the touch that began the present step
     airborne_since: float  # s, last time at which a foot was on the ground
@@ -170,7 +170,7 @@ def place_on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form that the states of its knees require, by default standing on foot 1.
+    """Return the walker on the ground, by default standing on foot 1, in the form that fits the states of its knees.
 
     level  (2,) m, height of the ground under each foot
     """
@@ -190,7 +190,7 @@ def locked_knees(knee: Any) -> int:
 class FootMotion(NamedTuple):
     along: float  # m, position along the slope
     height: float  # m, above the slope (after `relative_to_ground`: above the foot's ground, negative inside it)
-    slip: float  # m/s, velocity along the slope of the ball's material at its lowest point
+    slip: float  # m/s, velocity of the ball's material at its lowest point, along the slope
     vertical_velocity: float  # m/s, rate of the height
 
 
@@ -221,7 +221,7 @@ def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMot
     omega = y[half + form.places : 2 * half]
     ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
     for k in range(n):
-        # Turning counter-clockwise moves the lowest material of the ball downhill relative to its centre.
+        # Turning counter-clockwise moves the material at the bottom of the ball downhill relative to its centre.
         slip += omega[k] * form.rolling[foot, k]
     height += above - form.radius[foot]
     return FootMotion(along + ahead, height, slip + ahead_rate, vertical_velocity + above_rate)
@@ -271,7 +271,7 @@ def to_form(form: GroundModel, x: Any) -> Floats:
 
 
 def to_full(form: GroundModel, y: Any, size: int) -> Floats:
-    """Convert a form's state to the full state (size,) of all bodies with the same root."""
+    """Convert a form's state to the full state (size,) of all bodies, with the same root."""
     p = int(form.places)
     n = int(form.bodies)
     onto = form.onto[: size // 2 - p]

@@ -62,7 +62,7 @@ class Motion:
         return pieces
 
     def values_at(self, times: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (times, leg) at times (s). At a heel strike they are those just after it."""
+        """Compute angles and velocities (times, leg) at times (s). At a heel strike, return those just after it."""
         angle = np.empty((times.size, LEG_COUNT))
         velocity = np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
@@ -188,7 +188,8 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
     """Mark the phases (step, phase) at which both walks are smooth.
 
-    These are all phases after the impact, except those between a knee strike of one walk and the same one of the other.
+    These are all phases after the impact, except those between the times at which the two walks reach the same knee
+    strike.
     """
     # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
@@ -197,7 +198,7 @@ def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.
         others = reference.knee_phases(step)
         if strikes.size == others.size:
             for pair in zip(strikes, others, strict=True):
-                # This clears entries of `clear`, of which `row` is a view.
+                # `row` is a view, so this also changes `clear`.
                 row &= (phases < min(pair)) | (phases > max(pair))
     return clear
 

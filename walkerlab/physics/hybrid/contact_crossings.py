@@ -19,7 +19,7 @@ from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
-NO_SIDE = 0  # in `WalkState.sides`, for an event function that may cross zero in either direction
+NO_SIDE = 0  # value in `WalkState.sides` for an event function that may cross zero in either direction
 ZERO_ROUNDING = 1e-14  # m, rad or their rates; smaller values of event functions count as zero
 CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a solver step are not rounding
 

@@ -31,7 +31,7 @@ def change_form(
     # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
     y = method.y
     t = float(method.clock[T])
-    # the form with the same root in which all bodies are separate
+    # the form that has the same root, with all bodies separate
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
@@ -51,7 +51,7 @@ def change_form(
         observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
     if waits.size > 0:
         rate = state_rate(before, y, size, t)
-        # Changed states reach the event at other times, except that a pulse ends at a fixed time after the touch.
+        # A changed state reaches the event at a different time. But a pulse ends at a fixed time after the touch.
         if event != events.PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)

@@ -19,7 +19,7 @@ from walkerlab.physics.solvers.events import CrossingFinder
 NO_LIMIT = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
-LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
+LONGEST_FLIGHT = 0.25  # longest time for which both feet may be off the ground, in pendulum times
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
 # Maximum number of rewinds per solver step. After that, the end of the step counts as the event: rounding moves the
@@ -34,7 +34,7 @@ MAX_DOUBTFUL_REWINDS = 12
 def scan(system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder) -> tuple[float, int]:
     """Sample all event functions on a solver step into `finder.values`, and find the first event.
 
-    The result is that of `earliest_crossing`.
+    Returns the same as `earliest_crossing`.
     """
     for node in range(finder.nodes.size):
         sample_event_functions(system, walk_state, finder.states[node], node, finder)
@@ -47,7 +47,7 @@ class EventSearch(NamedTuple):
     target: float  # s, latest end of the next solver step
     event: int  # event that is being located, or the last event
     latest: float  # s, end of the solver step in which the event first appeared, an upper bound of its time
-    refinements: int  # number of corrections of the event's expected time; 0 if the target is not that time
+    refinements: int  # number of corrections of the event's expected time; 0 if `target` is another time
     rewinds: int  # number of rewinds of the present solver step
     accepted: bool  # whether the last solver step is valid; if not, it is repeated up to the new target
     occurs: bool  # whether the event happens at the end of the solver step
@@ -65,7 +65,7 @@ def walk_in_form(
 
     Returns the outcome code, or CHANGES_FORM, and the last event.
     """
-    # Begin with the step size that the walk's previous form would have used next.
+    # Keep the step size that was planned before the walk changed its form.
     stepping.begin(method, system, method.clock[stepping.T], method.y, method.clock[stepping.H_NEXT])
     search = seek(deadline(system, walk_state, method.clock[stepping.T]), events.NO_EVENT)
     terrain = walk_state.ground.terrain
@@ -144,7 +144,7 @@ def approach(
 ) -> EventSearch:
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already ends there."""
     latest = search.latest if search.refinements > 0 else end
-    # If another event comes first now, its refinements count from zero.
+    # If a different event now comes first, restart the count of refinements.
     refinements = search.refinements if event == search.event else 0
     # A solver step cannot have length zero.
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -236,7 +236,7 @@ def time_limits(walk_state: WalkState) -> tuple[float, float]:
 
 @kernel_part
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
-    """Estimate the time (s) from the end of the last solver step to an event function's zero, from its final slope."""
+    """Use an event function's final slope to estimate the time (s) from the end of the solver step to its zero."""
     last = finder.nodes.size - 1
     h = method.clock[stepping.T] - method.clock[stepping.T_OLD]
     change = finder.values[event, last] - finder.values[event, last - 1]

@@ -240,7 +240,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """Record the energy account and the work of the springs at the end of a step.
 
-    Those at the last heel strike give the work in completed steps.
+    The values at the last heel strike give the work in completed steps.
     """
     for entry in range(channels.ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
@@ -300,7 +300,7 @@ def add_work_until(method: Any, system: OnGround, fraction: float, account: Any)
 
 @kernel
 def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span: float, account: Any) -> None:
-    """Add the work and losses (J) from time `begin` (s) over `span` (s) to an account, from the states at the nodes."""
+    """Add the work and losses (J) from `begin` to `begin + span` (s) to an account, given the states at the nodes."""
     nodes, weights = rule
     for foot in range(2):
         if system.has_ground[foot] != 0:
@@ -317,7 +317,7 @@ def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span
 
 @kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
-    """Compute the energies (J) lost to damping and friction under a foot with ground."""
+    """Compute the energies (J) lost to damping and friction under a foot that has ground below it."""
     # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
     # would be inaccurate for powers of the penetration. Solver steps end at a release, so the foot stays released
     # within one.
@@ -325,7 +325,7 @@ def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: i
     friction = 0.0
     let_go = True
     last = len(weights) - 1
-    # The first node, the start of the solver step, has weight zero. It only serves the elastic energies below.
+    # The first node, at the start of the solver step, has weight zero. Only the elastic energies below need it.
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])
         damping += span * weights[i] * power[0]

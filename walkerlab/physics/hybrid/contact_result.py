@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_na
 from walkerlab.physics.solvers.stepping import BUDGET, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
-EXPECTED_STEP = 3.0  # pendulum times; most steps are shorter
+EXPECTED_STEP = 3.0  # longer than most steps, in pendulum times
 # Limit for the residual of the energy balance, divided by rtol times (energy + work exchanged). In random walks this is
 # at most 0.5 with radau5 for rtol from 1e-2 to 1e-9 (scripts/contact_campaign.py prints it), and at most 9 with the
 # libraries' multistep methods. In the stability catalogue it is at most 9, for ground of 1e14 N/m.
@@ -133,7 +133,11 @@ def new_observer(
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
-    """Create an observer of a walk from y, with samples at rising `times` (s) and a tangent of `directions` columns."""
+    """Create an observer of a walk that starts in state y.
+
+    times       rising sample times (s), or None for no samples
+    directions  number of columns of the tangent
+    """
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
@@ -191,8 +195,8 @@ def walk_on(
         tangent[: y.size] = forms.to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
-    # Forms have states of different sizes, and each size needs a method with memory of that size. These methods share
-    # clock and counts, so that they act as one.
+    # Forms have states of different sizes, and each size needs its own method object. These objects share clock and
+    # counts, so that they act as one.
     by_size = {y.size: lead}
     finder = finder_for(lead, events.EVENT_ROWS, walker.size)
     while True:
@@ -309,7 +313,7 @@ def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances)
 
 
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats, springs: float = 0.0) -> DrivenWork:
-    """Combine gravity's work for a displacement `along` the slope and `up` (m) with the drives' work in the account.
+    """Return gravity's work over a displacement (`along` the slope and `up`, m) and the drives' work from the account.
 
     springs  work of the springs (J), which the account does not contain
     """
@@ -317,7 +321,7 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats,
     work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
     if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
         return work._replace(hip=work.hip + springs)
-    # If the knees have dampers, the hip has none, so the knees do all the work in `hip` that the torque does not do.
+    # If the knees have dampers, the hip has none. All work in `hip` that is not the torque's is then the knees'.
     return work._replace(hip=work.hip_torque + springs, knees=work.hip - work.hip_torque)
 
 

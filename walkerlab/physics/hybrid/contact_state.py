@@ -81,11 +81,11 @@ class WalkState(NamedTuple):
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     touch_height: Any  # (steps,) m, height of the foothold above the slope
-    # (steps,) m, net slip of each step's stance foot from its touch to its lift, or to the other foot's touch if it has
-    # not lifted yet
+    # (steps,) m, net slip of each step's stance foot from touchdown to lift-off, or to the other foot's touchdown if it
+    # has not lifted off yet
     slip: Any
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
-    # (steps,) s, time at which each step's stance foot lifted, or of the other foot's touch if it has not lifted yet
+    # (steps,) s, time at which each step's stance foot lifted off or, if it has not yet, the other foot touched down
     lift_time: Any
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot
@@ -195,7 +195,7 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
     """
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
-            # The second value is reached only if the first one is zero.
+            # The loop gets to the second value only if the first one is zero.
             return (1 if value > 0.0 else -1), value is not value_and_rate[0]
     return otherwise, True
 

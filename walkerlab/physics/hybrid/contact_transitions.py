@@ -77,7 +77,7 @@ def apply_event(
             # The foot is below the top of the pad: it has hit the pad's side.
             return OFF_PAD
     elif kind == events.VERTICAL_VELOCITY:
-        # This function is not watched again before the next touch, when it has another value.
+        # This function is not watched again before the next touch, and by then it is no longer zero.
         walk_state.at_zero[event] = 0
         if pulse_left(system, t) > 0.0:
             walk_state.progress.release = events.AT_PULSE_END
@@ -124,7 +124,7 @@ def set_foothold(
     """
     terrain = walk_state.ground.terrain
     set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
-    # A foot below its next foothold passes through a plane on which the order of the feet matters. On any other ground
+    # Where the order of the feet matters, a foot below its next foothold passes through the plane. On any other ground,
     # it is stubbed.
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
@@ -181,7 +181,7 @@ def touch(
         return SLID if abs(material - walk_state.touched[foot]) > farthest_slide(terrain) else GOES_ON
     pitch = terrain.pitch
     if terrain.has_pads and walk_state.cells[foot] == walk_state.left_cells[foot]:
-        # A rolling foot leaves its pad at a distance from where it touched.
+        # A rolling foot leaves its pad some distance from where it touched down.
         away = abs(feet[foot].along - walk_state.foothold[foot] - walk_state.rolled[foot])
         return OFF_PAD if away > TRIP * pitch else GOES_ON
     if feet[foot].along - feet[stance].along < STEP_AHEAD * pitch:
@@ -213,7 +213,7 @@ def touch(
 
 @dispatch_by_type_or_default
 def catches(stop: Any) -> bool:
-    """Whether a knee locks as soon as it is straight. A compliant stop turns the knee back first."""
+    """Whether a knee locks as soon as it is straight. With a compliant stop, it locks once it turns back."""
     return False
 
 
@@ -241,7 +241,10 @@ def release(walk_state: WalkState, knee: int) -> None:
 
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
-    """Release the trailing knee at a step's touch, or note what it waits for (`AT_COMPRESSION`, `AT_PULSE_END`)."""
+    """Release the trailing knee at the touch that ends a step, or note what it waits for.
+
+    It can wait for `AT_COMPRESSION` or `AT_PULSE_END`.
+    """
     if form.has_knee[trailing] != 0:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = events.AT_PULSE_END

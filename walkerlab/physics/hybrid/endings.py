@@ -20,5 +20,5 @@ GOES_ON = -1  # the walk has not ended
 CHANGES_FORM = -2  # a contact walk continues in another form: a knee locks or is freed, or the legs change roles
 KNEE_STRUCK = -3  # a rigid swing continues with a straight knee
 FALLEN_HIP = 0.5  # leg lengths; a walker whose hip is lower than this above the slope has fallen
-STRAIGHT_KNEE = 1e-9  # rad or rad/s, largest difference between thigh and shank of a straight leg
-ON_GROUND = 1e-9  # leg lengths, largest difference between the heights of feet that are both on the ground
+STRAIGHT_KNEE = 1e-9  # rad and rad/s; thigh and shank of a straight leg differ by less than this in angle and rate
+ON_GROUND = 1e-9  # leg lengths; feet that are both on the ground differ in height by no more than this

@@ -29,13 +29,15 @@ BUDGET_OF_A_STEP = 50_000
 MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 MAXIMA = ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio")  # fields of tally and result
-CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
+# A sample closer to a heel strike than this fraction of the sampling interval is dropped.
+CLOSEST_SAMPLES = 1e-2
 
 
 class Samples(NamedTuple):
     """Samples of a walk, on a regular grid and on both sides of every heel strike."""
 
-    time_s: Array  # (samples,) strictly rising; samples before and after a heel strike have adjacent floats as times
+    # (samples,) strictly increasing; the times of the samples just before and after a heel strike are adjacent floats
+    time_s: Array
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
     step: NDArray[np.int64]  # (samples,) number of the step, from 0
     bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
@@ -77,7 +79,7 @@ class RigidWalkResult(WalkRecord):
 
 
 def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
-    """Describe how the ground would have to pull. The list is empty if it would not have to.
+    """Describe the pull that the ground would have to exert. The list is empty if no pull is needed.
 
     min_force    minimum normal force (N)
     min_impulse  minimum normal impulse in a strike (N s)
@@ -104,7 +106,8 @@ def take_walk(
     """Walk `steps` steps from `start`, or until the walk ends, with a limited budget of evaluations per step.
 
     advance      called after each block with the number of steps taken in it
-    heights      (steps + 1,) m, heights of the footholds above the slope from the start on; None for even ground
+    heights      (steps + 1,) m, heights of the footholds above the slope, the one at the start first; None for even
+                 ground
     step_length  m, step length of the gait, by default the distance between the feet at the start. On uneven ground, a
                  foot that lands less than a quarter of it ahead of the other foot ends the walk as a fall
 
@@ -218,7 +221,7 @@ class Recorder:
         events = np.append(strikes, self.time) if self.steps else strikes
         kept = are_far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
         swing = self.steps + np.arange(strikes.size)
-        # A strike has two states, before and after. Adjacent floats as times keep the samples in order.
+        # A strike has two states, before and after. Giving them adjacent floats as times keeps the samples in order.
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
         state = np.concatenate((observer.states[:count][kept], before, after))
         step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
@@ -280,8 +283,8 @@ def driven_work(
     walker: RigidModel, tally: RigidTally, start: State, before: Array, after: Array, gravity: float
 ) -> tuple[DrivenWork, float]:
     """Compute the work done in the completed steps and the energy residual (J). `gravity` is gravity's work (J)."""
-    # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
-    # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
+    # A push-off does its work before the strike, which loses part of it. The work of a damper cannot be computed from
+    # the states before and after strikes, so it is taken from the energy balance, which then leaves no residual.
     rows = range(len(walker.hinges))
     laws = [hinge_law(walker, row) for row in rows]
     starts = np.vstack((start, after[:-1])) if len(after) else before

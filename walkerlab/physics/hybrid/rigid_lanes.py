@@ -33,7 +33,7 @@ SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of `LaneMemory.slots`
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-# pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
+# pendulum times; a heel strike closer than this is reached by a Taylor expansion instead of a solver step
 ARRIVAL_TIME = 1e-5
 STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # attempted solver steps in one swing
@@ -58,7 +58,8 @@ class TwoLegs(NamedTuple):
     gravity_down: float
     slope: float  # rad
     lean: float  # rad
-    upright: float  # rad, angle of the stance leg from the slope's normal that puts the hip above its foot's centre
+    # rad, angle between the stance leg and the slope's normal at which the hip is above the centre of the stance foot
+    upright: float
     fallen: float  # rad, largest angle from `upright` at which the hip is high enough
     pendulum_time: float  # s
 
@@ -88,7 +89,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
 
 @lanes.derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
-    """Evaluate the equations of motion of rigid_model.py, written out for two bodies, for floats or lanes."""
+    """Evaluate the equations of motion of rigid_model.py, written out for two bodies. Values are floats or lanes."""
     R = system.radius
     along = system.gravity_along
     down = system.gravity_down
@@ -105,7 +106,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     r_1 = -along * U_1 - down * F_1
     r_2 = -along * U_2 - down * F_2
     M_12 = system.A[2] * cos_d + system.B[2] * sin_d
-    # Adding zero lanes turns the number into lanes, because the variable must have one type in both branches below.
+    # Adding lanes of zeros turns A[3] into lanes, because the variable must have one type in both branches below.
     M_22 = system.A[3] + 0.0 * cos_d
     if R != 0.0:
         pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
@@ -237,7 +238,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     change = dop853.SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(dop853.GROW_MOST, max(dop853.SHRINK_MOST, change))
     accepted = 1.0 - error
-    # positive if this solver step uses up the time
+    # positive if this solver step uses up the remaining time
     over = TINY_ERROR - (left - h)
     stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * walker.pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, lanes.load(rows, ARRIVALS))
@@ -310,7 +311,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Apply the heel strike if the solver step has reached it, otherwise make the next one last until the strike."""
+    """Apply the heel strike if the solver step has reached it. Otherwise choose the next step so that it ends there."""
     rows = memory.rows
     slots = memory.slots
     move_on(memory, lane)
@@ -320,7 +321,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
     if abs(wait) > ARRIVAL_TIME * walker.pendulum_time and rows[ARRIVALS, lane] <= STRIKE_REFINEMENTS:
         rows[ARRIVALS, lane] += 1.0
         step_before = abs(rows[STEP_BEFORE, lane])
-        # The solver step may have gone past the heel strike: the next one then goes back.
+        # The solver step may have overshot the heel strike. If so, the next step goes backwards.
         rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
         return endings.GOES_ON
     y = vector(walker.model.zero_state)
@@ -359,7 +360,7 @@ def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) 
 
 @kernel_part
 def interpolate_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's solver step by a quintic."""
+    """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's solver step with a quintic."""
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
     b = event_function(rows, END_STATE, lane, swing, stance)

@@ -116,7 +116,10 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
 
 @kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Return the ground's pull (N), the friction ratio and the swing foot's depth (m). See section 3.1 of the paper."""
+    """Return the pull (N) that the ground would have to exert, the friction ratio and the swing foot's depth (m).
+
+    See section 3.1 of the paper.
+    """
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     # The pull is minus the normal force, so that the worst value of all three is a maximum.

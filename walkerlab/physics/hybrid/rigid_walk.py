@@ -18,13 +18,13 @@ from walkerlab.physics.solvers import events, stepping
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder
 from walkerlab.physics.solvers.system import derivative
 
-LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
+LONGEST_SWING = 10.0  # a heel strike must come within this many pendulum times sqrt(L/g)
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
-# The search for a knee strike starts at this fraction of a swing's first solver step. Before 1e-9, rounding makes a
-# straight knee at rest cross zero.
+# The search for a knee strike starts at this fraction of a swing's first solver step. At fractions below 1e-9,
+# rounding makes a straight knee at rest cross zero.
 SEARCH_START = 1e-6
-# event functions, rows of the finder
+# row of each event function in the crossing finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
 LEG_RATE = 4  # row of the legs' relative angular velocity, not an event
 EVENTS = 5
@@ -252,7 +252,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         before[i] = y[i]
     derivative(system, method.clock[stepping.T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
-    # The solver step misses the event only by the error of its dense output, so a step of first order covers the rest.
+    # The solver step misses the event only by the error of its dense output, so one Euler step is enough to reach it.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]
@@ -268,7 +268,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
             lift = strikes.lift[step + 1, column - 1]
             if lift != 0.0 and not knee:
                 _, _, upward, _ = rigid.swing_foot_motion(model, y, y[n : 2 * n])
-                # A foothold that rises meets the foot earlier: `upward` is negative.
+                # A raised foothold meets the foot earlier, because `upward` is negative.
                 wait += lift / upward
             waits[step, column - 1] = wait
             events.shift_column(y, at, f, wait)
@@ -288,7 +288,8 @@ class HeelStrikes(NamedTuple):
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before the strikes
     after: Any  # (steps, m) states just after the strikes, with the legs' roles exchanged
-    # (steps,) s, times of the knee strikes; empty without knees. A negative input means a knee locked from the start
+    # (steps,) s, times of the knee strikes; empty without knees. As an input, a negative time means that the knee is
+    # locked from the start.
     knee_time: Any
     rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present foothold
     nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground

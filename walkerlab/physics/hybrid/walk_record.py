@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class WalkWork(NamedTuple):
-    """Computational cost of a walk, in the order of the methods' counts."""
+    """Computational cost of a walk. The fields are in the order in which the solver methods count them."""
 
     rhs_evaluations: int
     accepted: int

@@ -51,8 +51,8 @@ class SpringDamper(NamedTuple):
     """A spring, relaxed at zero angle, with a damper and a constant torque. Other laws derive from this class."""
 
     stiffness: float  # N m/rad
-    damping: float  # N m s/rad; a law dissipates energy only if it is not 0
-    torque: float  # N m, turns the first body forward and the second back; a law supplies energy only by this torque
+    damping: float  # N m s/rad; if this is 0, the law dissipates no energy
+    torque: float  # N m, turns the first body forward and the second back; a law's only source of energy
 
     @classmethod
     def units(cls, energy: float, time: float) -> "SpringDamper":

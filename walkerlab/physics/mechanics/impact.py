@@ -29,7 +29,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     the model of the swing that ends, `model` that of the next one. Any number of variational columns may follow the
     state. They are also mapped and written into `new`.
     """
-    # E[phase] makes bodies follow others, such as a locked shank its thigh (see tree.py).
+    # E[phase] makes bodies follow others: a locked shank, for example, follows its thigh (see tree.py).
     like = model.arm_x
     other_foot = phase == rigid.AT_STRIKE
     n = len(like)
@@ -95,7 +95,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
 
 
 class RootedTree(NamedTuple):
-    """Tree of n bodies about its root: the fields of a model's Mechanism that `project` needs."""
+    """Tree of n bodies, described relative to its root: the fields of a model's Mechanism that `project` needs."""
 
     A: Floats  # (n, n) kg m^2
     B: Floats
@@ -162,7 +162,7 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     # The impulse passes through the hip. This is the moment about the contact point of the leading leg.
     angular = share * (x_l * y_t - y_l * x_t)
     # Turning a leg moves the hip about the arc's centre, which is R above the contact point: dx = -(y - R), dy = x.
-    # With R > 0 the length of the trailing line also changes.
+    # With R > 0 the distance from the trailing contact point to the hip also changes.
     by_trailing = share * (x_l * x_t + y_l * (y_t - R_t)) - angular * x_t * R_t / (length * length)
     by_leading = -share * ((y_l - R_l) * y_t + x_l * x_t)
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
@@ -179,7 +179,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     n, E = len(model.arm_x), model.E[rigid.STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # The trailing leg carries no other body. Its constants about the hip are those with which it swings next.
+    # The trailing leg carries no other body. Its constants about the hip are the same as in its next swing.
     following = model.exchanged
     leg = [rigid.SWING] if following.shank == rigid.NO_SHANK else [rigid.SWING, int(following.shank)]
     for pairs in (A, B):
@@ -222,8 +222,8 @@ class Constraints(NamedTuple):
     E: Any  # (n, n) reduction of tree.py
     M: Any  # (n, n) kg m^2
     factors: Any  # (n, n) factors from `factor_linked`
-    F: Any  # (n,) kg m, first moments projected on the slope
-    U: Any  # (n,) kg m, first moments projected on the slope's normal
+    F: Any  # (n,) kg m, first moments projected onto the slope
+    U: Any  # (n,) kg m, first moments projected onto the slope's normal
 
 
 @forced_inline

@@ -63,7 +63,10 @@ class Revolute:
 
 @dataclass(frozen=True)
 class BallFoot:
-    """Ball fixed to a body, which touches the ground directly below its centre. A zero radius makes a point foot."""
+    """Ball that is fixed to a body and touches the ground directly below the ball's centre.
+
+    A zero radius makes a point foot.
+    """
 
     name: str
     body: str

@@ -69,7 +69,7 @@ def build_first_leg_model(
     soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
     n = len(groups.names)
     members = groups.members
-    # Each body belongs to one group, whose index is that of the only 1 in its row.
+    # Each body belongs to one group: the column of the only 1 in the body's row.
     coupled = {int(np.argmax(members[body])): row @ members for body, row in parts.followers(assembly).items()}
     # a leg has at most one knee, and the shank's group follows those of the legs
     shank, thigh = (2, SWING) if len(assembly.legs[0]) > 1 else (NO_SHANK, NO_SHANK)
@@ -159,7 +159,7 @@ def check_legs(assembly: parts.Assembly) -> None:
         raise ValueError(f"both legs list {', '.join(sorted(set(first) & set(second)))}; a body belongs to one leg")
     feet = tuple(foot.body for foot in assembly.feet)
     if len(feet) != 2 or feet[0] not in first or feet[1] not in second:
-        raise ValueError("a walker has two feet, the first on a body of the first leg, the second on one of the second")
+        raise ValueError("a walker has two feet: the first on a body of leg 1, the second on a body of leg 2")
     knees = {(knee.thigh, knee.shank) for knee in assembly.knees}
     for leg in assembly.legs:
         for above, below in pairwise(leg):

@@ -41,7 +41,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     coordinates: int  # [d] number of coordinates on the section
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees
-    unpaired: float  # kg m^2, coefficient of a torque on the stance leg that has no reaction: see `add_unpaired_torque`
+    unpaired: float  # kg m^2, coefficient of the torque on the stance leg in `add_unpaired_torque`
     radius: float  # [R] m, radius of the stance foot; 0 for a point foot
     swing_radius: float  # m, radius of the swing foot
     hip_x: float  # m, lever from the stance foot's centre to the hip, in the stance leg's frame
@@ -80,7 +80,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     @property
     def exchanged(self) -> "RigidModel":
-        """Model of the next step, in which the legs have exchanged their roles: the same model for equal legs."""
+        """Model of the next step, in which the legs have exchanged roles. If the legs are equal, it is this model."""
         return self if self.paired_with is None else pair(self.paired_with, self)
 
     def __eq__(self, other: object) -> bool:
@@ -178,7 +178,7 @@ class Mode(NamedTuple):
 
 @block.case(Mode)
 def state_or_column(system: Mode) -> Any:
-    """Return zeros (2 n,), the shape of the state and of each variational column."""
+    """Return zeros (2 n,) in the shape of the state and of each variational column."""
     return zeros(system.model.zero_state)
 
 
@@ -372,11 +372,11 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J) of the total mass at the point where a foot touches down.
+    """Compute the potential energy (J) of the walker if all its mass were at the point where a foot touches down.
 
     touched  rad, angle of the leg at its touch
     """
-    # The zero is that of `energies`, so that the two can be subtracted.
+    # This uses the same zero level as `energies`, so that the two can be subtracted.
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
 
@@ -413,8 +413,8 @@ def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Compute the sum (rad) of the straight legs' angles from the slope's normal: 0 if both feet are on even ground.
 
     For legs that are alike, the sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays
-    or lanes, measured from the vertical. (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from
-    the normal.
+    or lanes, measured from the vertical. Equation (9-2) of the paper reads theta_1 = -theta_2, which holds only for
+    angles from the normal.
     """
     return swing + stance + 2.0 * (model.slope + model.lean)
 
@@ -436,7 +436,7 @@ def step_length_changes(model: RigidModel, ends: Any, starts_turn: Any, ends_tur
 
 
 def mass_matrix(model: RigidModel, y: Any) -> Floats:
-    """Compute the mass matrix (n, n) of the bodies' rates (kg m^2), without couplings."""
+    """Compute the mass matrix (n, n) in kg m^2 for the bodies' angular velocities, before couplings are applied."""
     n = len(model.arm_x)
     s, c, F, U, r = np.zeros((5, n))
     M = np.zeros((n, n))

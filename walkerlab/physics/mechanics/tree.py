@@ -60,7 +60,7 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]], law: type[Spr
 
 
 def new_record(kind: Any, **fields: Any) -> Any:
-    """Create a structured scalar of a type from `record_type` that kernels can write. Fields not named are zero."""
+    """Create a structured scalar that kernels can write, with a type from `record_type`. Fields not named are zero."""
     record = np.zeros((), kind)[()]
     for name, value in fields.items():
         record[name] = value
@@ -69,13 +69,13 @@ def new_record(kind: Any, **fields: Any) -> Any:
 
 @fast_fields
 class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
-    """Constants (SI) of a tree of n bodies about its root, of its hinges and of the forces on it, for both models."""
+    """Constants (SI) for both models: a tree of n bodies relative to its root, its hinges and the forces on it."""
 
     A: Floats  # (n, n) kg m^2, as defined in mechanics/parts.py
     B: Floats  # (n, n) kg m^2
     arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
-    E: Floats  # (phases, n, n) reductions; a body that follows others has zero on the diagonal
+    E: Floats  # (phases, n, n) reductions; the diagonal entry of a body that follows others is zero
     hinges: Integers  # (rows, 2) bodies at each hinge; its resistance turns the first back and the second forward
     laws: Floats  # (rows, LAW_NUMBERS) parameters of the hinge law at each hinge
     push_off: float  # N s, impulse along the trailing leg: instantaneous, or a pulse that starts at the touch
@@ -189,7 +189,8 @@ def add_inertia_gradients(
             sin_d = s[l] * c[k] - c[l] * s[k]
             turning = A * sin_d - B * cos_d
             change = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
-            # All terms depend on theta_l - theta_k, so the derivative with respect to theta_k is the negative.
+            # All terms depend on theta_l - theta_k, so the derivative with respect to theta_k is minus that
+            # with respect to theta_l.
             diagonal -= change
             by_angle[k, l] += change
             by_rate[k, l] += 2.0 * omega[l] * turning

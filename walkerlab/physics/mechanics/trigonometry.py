@@ -16,8 +16,8 @@ PI_2 = 1.2154201012607932e-10
 def sine_cosine(x: float) -> tuple[float, float]:
     """Compute (sin x, cos x) within one unit in the last place.
 
-    Up to pi/4, the range of a walking leg, both are the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
-    Microsystems 1993), evaluated in independent pairs of terms. Beyond it, they are the library's functions.
+    Up to pi/4, the range of a walking leg, this evaluates the minimax polynomials of fdlibm (k_sin.c, k_cos.c; Sun
+    Microsystems 1993) in independent pairs of terms. For larger angles it calls the library's functions.
     """
     if abs(x) > QUARTER_PI:
         return math.sin(x), math.cos(x)
@@ -37,7 +37,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute (sin x, cos x) of lanes, within 3e-16 for angles up to a few thousand turns."""
+    """Compute (sin x, cos x) for each lane, with errors below 3e-16 for angles up to a few thousand turns."""
     # If any lane is further than a quarter turn from 0, the nearest multiple k pi is subtracted in every lane. Odd k
     # flips the sign, and k = 0 leaves a lane unchanged.
     if any_positive(abs(x) - HALF_PI):

@@ -134,8 +134,9 @@ def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) ->
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
     """Return the largest Lyapunov exponent of the attractor reached from z, or None if the walk fails."""
-    # Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
-    # tangent grows is therefore pushed off the gait, and a walk whose halves differ in mean growth is continued.
+    # Just beyond a flip, the tangent grows slowly, so a walk takes long to leave the unstable gait. A walk that repeats
+    # while its tangent grows is therefore pushed off the gait, and a walk whose halves differ in mean growth is
+    # continued.
     for _ in range(MAX_WALKS):
         # Any initial direction will do: the one that grows fastest soon dominates.
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
@@ -201,7 +202,7 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
 def settle_elsewhere(
     step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
 ) -> list[Seed]:
-    """Find other periodic gaits, on which walks from scattered starts near the attractor settle.
+    """Find other periodic gaits by letting walks from scattered starts near the attractor settle.
 
     spread  standard deviation of the starts' coordinates, as a fraction of the largest coordinate
     """

@@ -29,7 +29,7 @@ UNREACHED = -1  # attractor index of a walk that reaches no attractor
 MAX_CYCLE_PERIOD = 32  # steps; longer cycles count as aperiodic
 CYCLE_DISTANCE = 1e-7  # states closer than this count as equal
 SETTLING_STEPS = 2_000  # steps before a walk is checked for a cycle
-FIRST_STARTS = 64  # number of starts whose walks take SETTLING_STEPS before any attractor is known
+FIRST_STARTS = 64  # number of starts that walk all SETTLING_STEPS, because no attractor is known yet
 RESETTLING_STEPS = 400  # further steps of settled walks, at tight tolerances
 RETURN_STEPS = 1_000  # steps within which a walk near an attractor must come ten times closer to it
 MAX_SETTLED_WALKS = 32  # maximum number of settled walks that are continued
@@ -71,7 +71,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
     points: Floats  # (period, 3) section points in walking order, a stride apart, starting with the smallest angle
-    reach: float  # largest distance tried from which all test walks return to it, or zero if there is none
+    reach: float  # largest of the distances tried at which all test walks return to it, or zero if there is none
 
     @property
     def period(self) -> int:
@@ -205,7 +205,7 @@ def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """Return the cycle (period, 3) through a point (3,), beginning with its smallest angle.
+    """Return the cycle (period, 3) through a point (3,), beginning with the point of smallest angle.
 
     Returns None if the walk does not return to the point.
     """

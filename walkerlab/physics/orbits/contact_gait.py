@@ -1,6 +1,7 @@
 """Search for a gait of the contact model: walk from a rigid start to the section, then apply Newton's method.
 
-If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to actual ground.
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual
+ground.
 """
 
 import math
@@ -25,7 +26,7 @@ from walkerlab.physics.solvers.system import Floats, State
 WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
 SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
 CONTACT_EFFORT = Effort(1e-10, max_evaluations=10, shortest=1e-3, growth=2.0, rounding=1.0)
-# factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
+# largest factors by which the stiffness rises and the friction velocities fall from actual to nearly rigid ground
 MAX_STIFFENING = 100.0
 MAX_CREEP_FACTOR = 30.0
 # increments of the parameter that runs from nearly rigid ground (0) to the actual ground (1)

@@ -50,8 +50,8 @@ class SectionStep(MappedStep):
     # net slip over a stance: slip of the landing foot before the section, plus slip of the trailing foot after it
     slip_m: float
     rolling_m: float  # rolling distance over a stance, summed in the same way
-    spacing_m: float  # distance from the stance foot, as it stands on the section, to the touch of the other foot
-    moved_m: float  # distance that the landing foot moves from its touch to the next section
+    spacing_m: float  # distance from the stance foot's position at the section to where the other foot touches
+    moved_m: float  # distance that the landing foot moves between its touch and the next section
     dissipated_J: Floats  # (5,) losses to damping, friction, pad edges, knee strikes and knee stops
     driven: DrivenWork
     work: NDArray[np.int64]  # counts of right-hand-side evaluations, accepted steps, rejected steps and Jacobians
@@ -77,7 +77,7 @@ def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 
 def locked_shank(walker: ContactWalker, stance: int) -> int | None:
-    """Return the shank of the stance leg, whose knee is locked, or None if it has no knee."""
+    """Return the locked shank of the stance leg, or None if that leg has no knee."""
     return int(walker.whole.knees[stance, 0]) if walker.whole.has_knee[stance] else None
 
 
@@ -247,7 +247,7 @@ def step_from_section(
 def walk_from_section(
     site: WalkerOnGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float, stance: int
 ) -> DisturbedWalk:
-    """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
+    """Walk from the section over foothold heights (steps + 1,) (m), with a push (N s) at the hip at the first touch."""
     walker = site.walker
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
@@ -299,7 +299,7 @@ def have_different_soles(walker: ContactWalker) -> bool:
 
 
 def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) higher."""
+    """Return the angles (steps,) from the vertical at which straight legs land `along` (m) ahead, `up` (m) higher."""
     apart = 0.5 * np.hypot(along, up) / leg_length
     return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
@@ -321,7 +321,7 @@ def sample_legs_from_section(
 
 
 def place_footholds(site: WalkerOnGround, heights: Floats) -> WalkerOnGround:
-    # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
+    # On the section, the stance foot is at the height of the first touchdown, `heights[0]`.
     over = np.append(heights[0], heights) - heights[0]
     return replace_terrain(site, site.ground.terrain._replace(heights=over)) if over.any() else site
 
@@ -403,7 +403,7 @@ class ContactMap(StepMap):
 
         walker_at      function from the parameter to a walker, or to None if the value gives no valid walker
         scale          size of a typical change of the parameter
-        step_length_m  step length of a gait, which is the pitch of the plane that replaces pads
+        step_length_m  step length of a gait, the pitch of the `after_mid_swing` terrain that replaces pads
         like           walker of the family that gives the units
         first          leg that swings in even steps: 0 for leg 1, 1 for leg 2
         """
@@ -460,7 +460,7 @@ class ContactMap(StepMap):
     def take_disturbed_walk(
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        """Simulate a walk over foothold heights (m) from the touchdown after z, at which the push acts."""
+        """Simulate a walk over foothold heights (m) from the touchdown after z. The push acts at this touchdown."""
         site = maps.valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         start = z * self._units[swing % 2]
@@ -501,7 +501,7 @@ class ContactMap(StepMap):
 
 
 class AdaptivePads(Stepper):
-    """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step.
+    """Stepper (SI) of a walker on compliant ground. It sets the pitch of the pads to the length of the last step.
 
     pitches_m  initial pitch for each step of a gait; if the legs differ, one for the steps of each leg
     """

@@ -27,7 +27,7 @@ Points = tuple[tuple[float, Floats], ...]
 
 
 class Strides(NamedTuple):
-    """Limits of the increments of the parameter, and the number of points that the predictor uses."""
+    """Limits on the increments of the parameter, and the number of points that the predictor uses."""
 
     widest: float
     narrowest: float
@@ -55,7 +55,7 @@ class Follower:
         """Start from the state `first`.
 
         solve     function that returns the solution (m,) at a value near a guess, or None if there is none
-        abscissa  function of the value in which the solution is smooth
+        abscissa  function that maps the value to a variable in which the solution is smooth
         """
         self._solve = solve
         self._strides = strides
@@ -121,7 +121,7 @@ def correct(
 @dataclass(frozen=True)
 class StepControl:
     first: float = 0.01  # arclength of the first step
-    # arclength, so short because folds of long gaits are sharper than 1e-8
+    # arclength; it is this short because folds of long gaits are sharper than 1e-8
     shortest: float = 1e-9
     longest: float = 0.05  # arclength
     turn: float = 0.97  # cosine of the largest angle between the tangents of neighbouring points

@@ -1,7 +1,7 @@
 """Minimum or maximum of a gait quantity over walker parameters, with bounds on other quantities.
 
 SciPy's SLSQP searches parameters scaled to their bounds, with exact gradients and from several starts. If there is no
-gait, the function rises with the distance from the last point that had one, so that the search avoids the gap.
+gait, the objective increases with the distance from the last point that had one, so that the search avoids the gap.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ PRECISION = 1e-9  # a search ends when the quantity changes by less than this, r
 MAX_DESIGN_ITERATIONS = 60
 BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer than this to a bound count as on it
 SAME_OPTIMUM = 1e-4  # searches whose results differ by at most this fraction of the range found the same optimum
-# Penalty for a point without a gait, at a distance of one range from the last gait, as a multiple of the quantity's
-# initial value. It grows with the square of the distance.
+# A point without a gait that lies one range away from the last gait is penalised by this multiple of the quantity's
+# initial value. The penalty grows with the square of the distance.
 PENALTY_SLOPE = 10.0
 
 

@@ -1,7 +1,8 @@
 """Families of gaits over a parameter: branches, their bifurcations, and the cascades beyond their flips.
 
-A branch is followed from a gait in both directions until it leaves the span or is lost. At each flip the branch of
-twice the period is entered along the eigenvector of the multiplier -1, at an amplitude from the flip's normal form.
+A branch is followed from a gait in both directions until it leaves the span or is lost. At each flip, the search
+switches to the branch of twice the period: it moves along the eigenvector of the multiplier -1, by an amplitude from
+the flip's normal form.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -24,12 +25,12 @@ SAME_STATE = 1e-6  # states closer than this count as equal
 AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled branch
 MAX_MULTIPLIER_CHANGE = 0.6  # largest change of a multiplier near the unit circle from one point to the next
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
-SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
+SEED_EVALUATIONS = 20  # maximum number of evaluations when Newton's method starts from a seed
 CLOSED_LOOP = "returns to its first point"
 NO_WALKER = "the parameter's next value gives no valid walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # values closer than this to an edge, relative to the size of the span, count as on it
-# maximum number of points per branch, and growth of a disturbance over a cycle beyond which gaits cannot be resolved
+# maximum number of points per branch, and maximum growth of a disturbance per cycle for which gaits can be resolved
 MAX_BRANCH_POINTS = 400
 MAX_CYCLE_GROWTH = 1e4
 
@@ -115,7 +116,7 @@ class GaitBranch:
                 yield first, first.z + share * (second.z - first.z)
 
     def closes_on(self, flip: Bifurcation) -> list[bool]:
-        # An end counts as near a flip up to twice the distance to its neighbour on the branch.
+        # An end counts as near a flip if it is at most twice as far from the flip as from its neighbour on the branch.
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
         return [flip.kind == "flip" and end.closes and is_near for end, is_near in zip(self.ends, near, strict=True)]
@@ -223,7 +224,7 @@ class BranchTracer:
         return is_acceptable
 
     def steps_to_repeat(self, gait: Cycle) -> int:
-        """Return the number of steps after which a gait repeats, which divides the number of its steps."""
+        """Return the number of steps after which a gait first repeats, a divisor of the number of its stored steps."""
         stride = self.step_map.stride
         strides = enumerate(gait.steps[stride - 1 :: stride], 1)
         return next(n * stride for n, step in strides if np.abs(step.z - gait.z).max() < SAME_STATE)
@@ -235,7 +236,7 @@ class BranchTracer:
 
         Returns only the end if no point follows.
         """
-        # A step out of the span is cut at its edge, because there may be no walker beyond.
+        # A step that would leave the span ends at the span's edge, because the walker may not exist beyond it.
         ahead = last.x + step * last.tangent
         acceptable = self.check_after(last)
         edge = self.span.nearest(equations.value(ahead))
@@ -281,12 +282,12 @@ class BranchTracer:
 
 
 class BranchFollower(BranchTracer):
-    """Finds the branches that pass through gaits, and those that leave them at flips."""
+    """Finds the branches through given gaits, and the branches that split off at their flips."""
 
     def family(
         self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
     ) -> tuple[GaitBranch, ...]:
-        """Return the `previous` branches, new ones through the seeds, and the cascades beyond their flips.
+        """Return the `previous` branches, new ones through the seeds, and the cascades beyond flips of the new ones.
 
         periods  maximum period of a branch
         """
@@ -358,7 +359,7 @@ class BranchFollower(BranchTracer):
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = bifurcations.predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, Effort(self.control.tolerance))
-            # A correction as large as the amplitude may have led back to the gait of the single period.
+            # A correction as large as the amplitude may have led back to the gait that repeats after `period` steps.
             if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
                 half = self.equations(period)(point.x)
                 parting = half.value @ (half.jacobian @ point.tangent)
@@ -386,7 +387,7 @@ def half_cycle_difference(gait: Cycle) -> Floats:
 
 
 def halves_meet(last: Cycle, gait: Cycle) -> bool:
-    """Whether a branch has reached the gait of half the period: the cycle's halves coincide or have swapped."""
+    """Whether a branch has reached a gait of half its period: the cycle's halves coincide or have swapped places."""
     parted = half_cycle_difference(gait)
     return bool(np.abs(parted).max() < SAME_STATE or half_cycle_difference(last) @ parted < 0.0)
 

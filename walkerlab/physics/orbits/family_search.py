@@ -171,9 +171,9 @@ class FamilySearch:
         return replace(family, attractors=swept, exponents=tuple(exponents))
 
     def add_doubled_gaits(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Return the family with gaits of 2, 4, 8, ... steps beyond flips outside the span, and an attractor.
+        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span.
 
-        The attractor is the one at the smallest value, or None if there is none.
+        Returns the family, and the attractor of these gaits at the smallest value or None if there is none.
         """
         # A walk from an end of the branch leaves the gait for the attractor. The points to which it nearly returns are
         # the seeds.

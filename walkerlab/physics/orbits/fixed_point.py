@@ -27,7 +27,7 @@ from walkerlab.physics.solvers.system import Floats, State
 RANDOM_START = "random start"
 # rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
-# Fraction of the angle between the legs at heel strike, below which samples do not resolve angles.
+# Samples do not resolve angles smaller than this fraction of the angle between the legs at heel strike.
 ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
 # tolerances of steps during the search. The gaits themselves are solved with EXACT_STEPS
@@ -64,7 +64,7 @@ class RigidGait:
     multipliers: tuple[complex, ...]
     stride_multipliers: tuple[complex, ...]  # eigenvalues for a stride
     steps: tuple[tuple[float, float], ...]  # period (s) and length (m) of both steps; leg 1 swings in the first
-    residual: float  # rad, largest component of P(x) - x, computed in a separate step, with velocities times sqrt(L/g)
+    residual: float  # rad, largest component of P(x) - x from a separate step, with velocities multiplied by sqrt(L/g)
     energy: float  # J, mean over the duration of the step, with heights from the stance foot
     energy_drift: float  # J, maximum minus minimum energy
     min_normal_force: float  # N
@@ -117,7 +117,7 @@ class RigidGait:
 
 def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     """Whether the swing foot comes down exactly at the stance foot, in states (samples, 2 n) with straight legs."""
-    # The step map is discontinuous at such a gait: if the foot came down slightly further ahead, it would strike.
+    # The step map is discontinuous at such a gait: slightly further ahead, the touch would be a heel strike.
     if not walker.alike:
         return False
     over = rigid.feet_on_slope(walker, swing[:, rigid.SWING], swing[:, rigid.STANCE])
@@ -184,11 +184,11 @@ DRIVE_SOURCE = f"followed from passive gaits as a last resort (slopes of {', '.j
 @dataclass(frozen=True)
 class GaitSearch:
     gaits: tuple[RigidGait, ...]  # all period-1 gaits found, sorted by period
-    chosen: int | None  # index of the gait to walk; None if no gait is physical
+    chosen: int | None  # index of the gait to simulate; None if no gait is physical
     reason: str  # why this gait was chosen, or why no gait was found
     random_hits: tuple[int, ...] = ()  # for each gait, the number of random starts that led to it
     random_starts: int = 0  # number of random starts
-    lost: tuple[str, ...] = ()  # why followed gaits did not reach this walker
+    lost: tuple[str, ...] = ()  # why gaits followed from other walkers did not lead to one of this walker
     followed: str = SEED_SOURCE  # where the gaits were followed from
 
     @property
@@ -235,7 +235,10 @@ MAX_DIFFERENCE_JUMP = 0.05  # distance from the prediction; beyond it the gait b
 
 
 class SlopeBranch:
-    """A gait over the slope phi: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and period T, where s = phi^(1/3)."""
+    """A gait as a function of the slope phi.
+
+    It is given by y = (theta_2 + phi, dtheta_1, dtheta_2) / s and the period T, where s = phi^(1/3).
+    """
 
     # Both gaits of small-slope theory are smooth in s^2, so a polynomial through the last points predicts the next one.
 
@@ -317,7 +320,7 @@ def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> rigid_map.Rigi
 
 def average_legs(walker: RigidModel, share: float) -> RigidModel:
     """Return the walker with only the fraction `share` of the difference between its legs. At 0 the legs are equal."""
-    # The constants of both models enter the equations linearly, so every mean of them is a valid walker.
+    # The constants of both models enter the equations linearly, so any weighted mean of the two is a valid walker.
 
     def blend(model: RigidModel, other: RigidModel) -> RigidModel:
         parts = {name: 0.5 * ((1.0 + share) * model[name] + (1.0 - share) * other[name]) for name in LEG_FIELDS}
@@ -367,7 +370,7 @@ class Search:
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def follow_difference(self, seed: int, settings: SearchSettings) -> None:
-        """Follow the gaits of the walker with two mean legs as the difference between the legs grows."""
+        """Start with equal legs, the mean of both, and follow their gaits as the difference between the legs grows."""
         goal = self.walker
         if goal.shank != goal.exchanged.shank:
             self.lost.append("only one leg has a knee, so there is no walker with two mean legs to start from")

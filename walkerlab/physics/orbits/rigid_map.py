@@ -433,6 +433,73 @@ class SimilarWalker(NamedTuple):
             behind += math.cos(psi) * x - math.sin(psi) * y
         return self.radius * (before + after + self.apart) - behind
 
+    def take_disturbed_walk(
+        self, stepper: RigidStepper, z: Floats, heights_m: Floats, push_N_s: float, swing: int
+    ) -> DisturbedWalk:
+        walker, section, *_ = self.leg_swing(swing)
+        units = self.units
+        start = np.array(state_on_section(walker, z))
+        start = push_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
+        walk = stepper.walk(section, z, heights_m.size - 1, False, self.floor(z, heights_m), start)
+        before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
+        starts = np.vstack((start, after))[:-1]
+        lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
+        durations = np.diff(walk.time, prepend=0.0) * units.time
+        last = walk.z[-1] if walk.z.size else z
+        return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
+
+    def differentiate_walk(
+        self, stepper: RigidStepper, z: Floats, heights_m: Floats, along: Floats, times_s: Floats, kicked: bool
+    ) -> VariedWalk | None:
+        """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
+        units = self.units
+        d, m = self.section.basis.shape
+        steps = heights_m.size - 1
+        rises, nearest = self.floor(z, heights_m)
+        walk = stepper.walk(self.section, z, steps, False, (rises, nearest))
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        starts = np.vstack((state_on_section(self.walker, z), walk.strikes.after))
+        touches = np.append(0.0, walk.time)
+        # No kicks at the start, because changes of the start are columns of `along`, and none after the last step.
+        kicks = [unit_kicks(*self.leg_swing(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
+        given = along.shape[1]
+        count = given + sum(map(len, kicks))
+        lifts = np.zeros((steps + 1, count))
+        lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
+        columns = np.zeros((count, m))
+        since = np.zeros(count)
+        columns[:given] = along[:d].T @ section_basis(self.section, z)
+        of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
+        parts = list[tuple[Floats, ...]]()
+        for step, start in enumerate(starts[:-1]):
+            walker, section, *_ = self.leg_swing(step)
+            room = LAST_SAMPLE * (touches[step + 1] - touches[step])
+            times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
+            tangents = stepper.differentiate(section, start, (rises[step : step + 2], nearest), times)
+            if tangents is None:
+                return None
+            moved = np.column_stack((columns, lifts[step + 1]))
+            before, after = moved @ tangents.before, moved @ tangents.after
+            lengths = rigid.step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
+            # The sample times are fixed, so if a step begins later, its samples lie earlier within it.
+            samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
+            parts.append((moved @ tangents.waits, lengths, after[:, rigid.STANCE], tangents.rates, samples))
+            columns = after
+            since = since + parts[-1][0]
+            if step < len(kicks):
+                first = given + sum(map(len, kicks[:step]))
+                columns[first : first + len(kicks[step])] = kicks[step]
+        durations, lengths, angles = (np.array(each) for each in list(zip(*parts, strict=True))[:3])
+        rates, samples = (np.concatenate(each) for each in list(zip(*parts, strict=True))[3:])
+        return VariedWalk(
+            durations * units.time,
+            lengths * units.length,
+            angles,
+            reorder_by_leg(rates, of_step) / units.time,
+            reorder_by_leg(samples, of_step),
+        )
+
 
 class RigidMap(StepMap):
     """Step map of the rigid model, in section coordinates of the walker scaled to unit size."""
@@ -505,18 +572,7 @@ class RigidMap(StepMap):
     def take_disturbed_walk(
         self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
     ) -> DisturbedWalk:
-        unit = maps.valid(self._unit_at(p))
-        walker, section, *_ = unit.leg_swing(swing)
-        units = unit.units
-        start = np.array(state_on_section(walker, z))
-        start = push_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        walk = self._exact.walk(section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
-        before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
-        starts = np.vstack((start, after))[:-1]
-        lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
-        durations = np.diff(walk.time, prepend=0.0) * units.time
-        last = walk.z[-1] if walk.z.size else z
-        return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, rigid.STANCE], last)
+        return maps.valid(self._unit_at(p)).take_disturbed_walk(self._exact, z, heights_m, push_N_s, swing)
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = maps.valid(self._unit_at(p))
@@ -534,57 +590,8 @@ class RigidMap(StepMap):
         times_s: Floats = maps.NO_TIMES,
         kicked: bool = False,
     ) -> VariedWalk | None:
-        """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
         unit = self._unit_at(p)
-        if unit is None:
-            return None
-        units = unit.units
-        d, m = unit.section.basis.shape
-        steps = heights_m.size - 1
-        rises, nearest = unit.floor(z, heights_m)
-        walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
-        if walk.outcome is not Outcome.WALKED:
-            return None
-        starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
-        touches = np.append(0.0, walk.time)
-        # No kicks at the start, because changes of the start are columns of `along`, and none after the last step.
-        kicks = [unit_kicks(*unit.leg_swing(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
-        given = along.shape[1]
-        count = given + sum(map(len, kicks))
-        lifts = np.zeros((steps + 1, count))
-        lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
-        columns = np.zeros((count, m))
-        since = np.zeros(count)
-        columns[:given] = along[:d].T @ section_basis(unit.section, z)
-        of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
-        parts = list[tuple[Floats, ...]]()
-        for step, start in enumerate(starts[:-1]):
-            walker, section, *_ = unit.leg_swing(step)
-            room = LAST_SAMPLE * (touches[step + 1] - touches[step])
-            times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
-            tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
-            if tangents is None:
-                return None
-            moved = np.column_stack((columns, lifts[step + 1]))
-            before, after = moved @ tangents.before, moved @ tangents.after
-            lengths = rigid.step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
-            # The sample times are fixed, so if a step begins later, its samples lie earlier within it.
-            samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
-            parts.append((moved @ tangents.waits, lengths, after[:, rigid.STANCE], tangents.rates, samples))
-            columns = after
-            since = since + parts[-1][0]
-            if step < len(kicks):
-                first = given + sum(map(len, kicks[:step]))
-                columns[first : first + len(kicks[step])] = kicks[step]
-        durations, lengths, angles = (np.array(each) for each in list(zip(*parts, strict=True))[:3])
-        rates, samples = (np.concatenate(each) for each in list(zip(*parts, strict=True))[3:])
-        return VariedWalk(
-            durations * units.time,
-            lengths * units.length,
-            angles,
-            reorder_by_leg(rates, of_step) / units.time,
-            reorder_by_leg(samples, of_step),
-        )
+        return None if unit is None else unit.differentiate_walk(self._exact, z, heights_m, along, times_s, kicked)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         unit = self._unit_at(p)

@@ -125,7 +125,7 @@ def question_of(
 
 
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> "ContactQuestion":
-    """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
+    """Build the contact model whose walks are classified, with the tolerances that `tune` uses for its map."""
     if config.contact is None:
         raise walkers.contact_required_error("basin.model: contact", config.walker, "Add one.")
 
@@ -199,8 +199,8 @@ def gaussian(window: grid.Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from the gait, if it is stable, to the nearest failing cell, or {} without
-    one."""
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or {} if the gait is
+    unstable or no cell fails."""
     # The error of the distance is the size of a cell.
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
@@ -212,7 +212,7 @@ def margin_of(config: RigidConfig, window: grid.Window, ends: grid.WalkEnds, gai
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
-    """Rigid model, and how the ends of its walks are classified."""
+    """Rigid model, with the data needed to classify how its walks end."""
 
     rigid: RigidModel
     walker: grid.Walker  # the unit walker
@@ -295,7 +295,7 @@ Question = RigidQuestion | ContactQuestion
 def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
 ) -> list[WorkUnit]:
-    """Divide cells, which need `walks` walks each, into work units of `at_once` cells. A unit is named by its first
+    """Divide cells, which need `walks` walks each, into work units of `at_once` cells. A unit is named after its first
     cell."""
     groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]

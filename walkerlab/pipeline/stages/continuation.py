@@ -1,4 +1,4 @@
-"""Follow families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
+"""Follow families of gaits as a parameter varies: branches, bifurcations, cascades and chaos."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds of a search, and a function that builds the step map of a config over the parameter."""
 MIN_REACH = 1e-9  # a branch that covers less than this fraction of the span counts as a single gait
 START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHT_EFFORT = newton.Effort(1e-13)  # accuracy of Newton's method for measuring the numerical error
+TIGHT_EFFORT = newton.Effort(1e-13)  # tolerance for gaits that are recomputed to measure the numerical error
 GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
@@ -134,7 +134,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models whose gaits are to be followed.
 
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
-    of a span is invalid, or the second key equals the first or has a range without the value in the config.
+    of a span is invalid, the second key equals the first, or the second key's range excludes its value in the config.
     """
     config = question.config
     second = question.second
@@ -390,7 +390,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     """
     attractors = family.attractors
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
-    # From the last flip to the limit of the cascade, gaits of longer periods than those followed are stable.
+    # Between the last flip and the limit of the cascade, the stable gaits have longer periods than the gaits followed.
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
         attractor.value

@@ -32,7 +32,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, refuse_unread, section_coordinates
 
 SOLVED: Final = newton.Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # difference step for largest disturbances, as a fraction of the range between the bounds
+DIFFERENCE: Final = 5e-3  # finite-difference step for largest disturbances, as a fraction of the range of the bounds
 FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; at a coarser one, noise would mislead the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING_GAP: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
@@ -172,7 +172,7 @@ class Gaits:
         self.largest = wanted & LARGEST.keys()
         self.steps = config.robustness.steps
         self.gaps = [DIFFERENCE * (high - low) for low, high in design.over.values()]
-        self.counts = np.zeros(2, int)  # numbers of all evaluations, and of those without a gait
+        self.counts = np.zeros(2, int)  # number of evaluations, and of those that found no gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
         self.z = find_model_gait(design.model, config, gait, progress.note).z
@@ -240,9 +240,10 @@ class Gaits:
     def differentiate_largest(
         self, subject: ModelUnderTest, numbers: Mapping[str, float], parameter: Parameter, gap: float
     ) -> dict[str, float]:
-        """Differentiate the largest disturbances by a parameter, from gaits at values `gap` below and above.
+        """Differentiate the largest disturbances with respect to a parameter.
 
-        If there is no gait on one side, the difference from the gait in the middle is used.
+        The difference is between gaits at values `gap` below and above. If there is no gait on one side, the gait in
+        the middle takes its place.
         """
         if not self.largest:
             return {}

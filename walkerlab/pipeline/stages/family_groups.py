@@ -126,9 +126,9 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return a list with the flip where a branch begins, or an empty list if it does not begin at a flip.
+    """Return the flip where a branch begins, in a list that is empty if it does not begin at a flip.
 
-    The steps of the flip's gait are in it twice in a row, because gaits of the branch have twice as many.
+    The steps of the flip's gait are repeated, because gaits of the branch have twice as many.
     """
     for parent in branches:
         for flip in parent.bifurcations:

@@ -87,7 +87,7 @@ def read_data(config: IdentifyConfig) -> MeasuredFile:
     if block.sensors and block.level == "steps":
         raise ConfigError(
             f"identify.nuisance: {', '.join(block.sensors)}: only sampled angles have these sensor properties.",
-            "Leave out --nuisance and --camera-tilt free, or give angles over time (--level angles).",
+            "Leave out `--nuisance` and `--camera-tilt free`, or give angles over time (`--level angles`).",
             ("identify", "nuisance"),
         )
     refuse_keys(config, block)
@@ -128,8 +128,7 @@ def refit_with_new_strikes(
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
-    # The sum of the angles at a strike is off by twice the error of an angle, which is that of slope and sensor
-    # together.
+    # The sum of the angles at a strike is off by twice the error of one angle, to which slope and sensor contribute.
     touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
     same_soles = rigid_walker(identified).alike
     if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
@@ -208,8 +207,8 @@ def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
 def worst_moves(known: Information) -> Floats | None:
     """Return changes of one standard deviation along the two combinations of parameters that the walk determines worst.
 
-    The changes (2, parameters) are independent and in the keys' units, the worst first. Returns None if the walk
-    determines fewer than two combinations.
+    The changes (2, parameters) are independent of each other and in the keys' units. The worst determined one is first.
+    Returns None if the walk determines fewer than two combinations.
     """
     worst = known.directions[~is_open(known.singular_values)][-2:]
     if len(worst) < 2:
@@ -294,8 +293,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
-    """Return the masses that were not fitted but taken from the config, because the estimated masses are relative to
-    them."""
+    """Return the masses that were taken from the config, not fitted. The estimated masses are relative to them."""
     # The contact model needs no reference, because the stiffness sets the scale of mass.
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}

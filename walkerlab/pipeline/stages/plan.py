@@ -153,7 +153,7 @@ def predict_measured(
     """
     family = identification.ConfigFamily(subject.config, question.keys)
     walks = identification.step_map_of(subject, family)
-    # The walk has one step more than are measured, because samples must lie before its last heel strike.
+    # The walk is one step longer than the measurement, because samples must lie before its last heel strike.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
@@ -172,7 +172,7 @@ def predict_measured(
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """Walk that is predicted, not measured, with its derivatives."""
+    """Predicted (not measured) walk, with its derivatives."""
 
     forecast: prediction.Forecast
     data: mixed_model.Linearised
@@ -186,7 +186,7 @@ def walk_of(subject: ModelUnderTest, measured: measurements.MeasuredWalk, questi
     """
     problem = identification.problem_of(subject, measured, question)
     if measured.sampled:
-        # `identify` always fits a delay to angles at their sample times.
+        # If `identify` fits angles at their sample times, it always estimates a delay, too.
         nuisances = tuple(dict.fromkeys((*question.sensors, prediction.DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast

@@ -95,8 +95,9 @@ def read_artifact(path: Path) -> Recording:
 def content_of(
     block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps, doubts: Sequence[str]
 ) -> Content:
-    """Build the content to store, with the names of computed walks. It has energies and forces only if they were
-    recorded.
+    """Build the content to store, with variables named as in computed walks.
+
+    It has energies and forces only if they were recorded.
     """
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)

@@ -69,7 +69,7 @@ def leg_variables(samples: Samples) -> dict[str, Variable]:
 
 
 def reorder_by_leg(by_role: Any, stance: Any) -> Any:
-    """Reorder values (samples, 2) of swing and stance leg to those of leg 0 and leg 1."""
+    """Reorder values (samples, 2) from swing and stance leg to leg 0 and leg 1."""
     return np.take_along_axis(by_role, np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]]), axis=1)
 
 

@@ -57,7 +57,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
         "disturbance": Label("", "disturbance of the first step"),
         "indicator": Label("", "measured quantity of the steps"),
-        "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
+        "value": Label("SI", "gait sensitivity norm, in the indicator's unit per unit of the disturbance"),
         "direct": Label("SI", "change of the disturbed step itself"),
         "error": Label("SI", "error of the norm, from difference quotients with two step sizes"),
     },
@@ -133,7 +133,7 @@ def run(
         label = f"robustness: {subject.model} model"
         units = [*single_disturbance_units(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
-        # Computing the quantities of the gait has compiled all kernels.
+        # All kernels are compiled by now, because the gait's quantities have been computed.
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         target = {"steps": config.robustness.steps}
         for each in gaits:
@@ -174,7 +174,8 @@ def refuse(config: RobustnessConfig) -> None:
     for roughness in block.roughness_m:
         if roughness > half:
             raise ConfigError(
-                f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
+                f"robustness.roughness_m: {roughness:g} m is more than half the leg length ({half:g} m), and no "
+                "step survives that.",
                 "The unit is metres: write 1 mm as 0.001.",
             )
 
@@ -285,7 +286,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
-    """Return a row for each roughness of the ground, which summarises the step counts `steps` (roughness, walk)."""
+    """Summarise the step counts `steps` (roughness, walk) in one row for each roughness of the ground."""
     most = cap(model, config)
     rows = []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
@@ -325,7 +326,6 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
 
 
 def parameters_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, among those `requested` or, if that is None, among
-    all."""
+    """Return the dotted keys of the parameters that the model reads. If `requested` is given, consider only those."""
     selection = parameter_keys(subject.config) if requested is None else requested
     return tuple(key for key in selection if model_reads(subject.model, subject.config, key))

@@ -69,7 +69,7 @@ WALKS = (
 QUESTIONS = (
     Stage(
         "continuation", "walkerlab.pipeline.stages.continuation",
-        "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
+        "Follow families of gaits as a parameter varies: branches, bifurcations, cascades, chaos.",
         reads.ContinuationConfig, only_by="continuation", shown_by=DRAWINGS,
         options=(
             Option("--over", "continuation.over", "KEY", "Key to vary, e.g. slope_deg.", "key", ("--from", "--to")),

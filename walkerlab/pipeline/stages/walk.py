@@ -1,8 +1,8 @@
 """Parts shared by the stages that compute walks: start, stored groups, summary and numerical error.
 
-Both models store a walk with the same names, shapes and meanings, but without quantities that the model lacks. Of a
-long walk, all samples of the first and last steps are stored, and fewer of the others. The numerical error is the
-change of a walk's quantities at tighter tolerances.
+Both models store a walk with the same names, shapes and meanings, but without quantities that the model lacks. For a
+long walk, all samples of the first and last steps are stored, but fewer samples of the steps between. The numerical
+error is the change of a walk's quantities at tighter tolerances.
 """
 
 import math
@@ -55,7 +55,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances with more budget (or another method, if they cannot be tightened), and a
+    """Return tighter tolerances with a larger budget (or another method, if they cannot be tightened), and a
     description."""
     tolerances = replace(tolerances, budget=min(BUDGET_FACTOR * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
@@ -116,7 +116,7 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
         return largest
     end = count - 1 - (later or 0)
     steps = np.arange(count)
-    # for each step, the last one at the same place in the cycle that has a counterpart in the second walk
+    # for each step, the last step that is at the same place in the cycle and has a counterpart in the second walk
     last = end - (end - steps) % period
     between = changes[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
@@ -132,7 +132,7 @@ FIRST_STEPS = 200
 LAST_STEPS = 20
 """Every sample is stored for this many steps at the end of a walk."""
 MAX_BETWEEN = 50_000
-"""Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
+"""Maximum number of samples stored for the steps in between, besides those on both sides of every heel strike."""
 MIN_REPEATED = 4
 """Walks with fewer steps are not tested for repetition."""
 MAX_REPEATED = 32
@@ -156,15 +156,15 @@ LEG = "leg"
 COORDINATE = "coordinate"
 STEP_LABELS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
-    "period_s": Label("s", "time from touch to touch"),
-    "length_m": Label("m", "distance along the slope from touch to touch"),
+    "period_s": Label("s", "time from one touch to the next"),
+    "length_m": Label("m", "distance along the slope from one touch to the next"),
     "touch_along_m": Label("m", "position of the touch along the slope from the first foothold"),
     UNEVEN: Label("m", "height of the touched foothold above the slope"),
     "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
     "slip_m": Label("m", "net material slip of the stance foot from its touch to its lift"),
     "rolling_m": Label("m", "rolling distance of the stance foot from its touch to its lift"),
     "state_before": Label("rad, rad/s", "state just before the touch", (COORDINATE,)),
-    "state_after": Label("rad, rad/s", "state just after the touch, roles exchanged", (COORDINATE,)),
+    "state_after": Label("rad, rad/s", "state just after the touch, with the legs' roles exchanged", (COORDINATE,)),
 }
 # Columns whose value is missing if a knee does not lock, or if the last stance foot does not lift.
 INCOMPLETE_COLUMNS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
@@ -182,7 +182,7 @@ TIME_LABELS: Final = {
     "foot_height_m": Label("m", "height of the foot's lowest point above the slope"),
     "normal_force_N": Label("N", "normal force of the ground on the foot"),
     "friction_force_N": Label("N", "force of the ground on the foot along the slope, positive downhill"),
-    "penetration_m": Label("m", "depth of the foot in the ground that carries it"),
+    "penetration_m": Label("m", "penetration of the foot, zero where no ground carries it"),
     "slip_velocity_m_s": Label("m/s", "velocity of the foot's lowest material point"),
     "kinetic_J": Label("J", "kinetic energy"),
     "potential_J": Label("J", "potential energy, which is zero at the step's foothold"),
@@ -271,8 +271,8 @@ def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) ->
     between = np.flatnonzero(~stored)
     stored[between[:: max(1, -(-between.size // MAX_BETWEEN))]] = True
     progress.note(
-        f"{ends.size} steps: {np.count_nonzero(stored)} of {step.size} samples are stored: all of the first "
-        f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between, and both sides of every heel strike"
+        f"Of {step.size} samples in {ends.size} steps, {np.count_nonzero(stored)} are stored: all in the first "
+        f"{FIRST_STEPS} and last {LAST_STEPS} steps, fewer between them, and both sides of every heel strike"
     )
     return select_samples(samples, stored)
 
@@ -305,7 +305,10 @@ def leg_labels() -> dict[str, Variable]:
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `STEP_LABELS`. NaN and the ends of short lists become missing values."""
+    """Build variables over steps, named as in `STEP_LABELS`.
+
+    Short lists are padded, and the padding and NaN become missing values.
+    """
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -351,9 +354,10 @@ def drive_measures(walk: WalkRecord) -> dict[str, Any]:
 
 
 def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
-    """Find after how many steps a walk on even ground repeats at its end, and at which step it leaves its gait.
+    """Find the period, in steps, with which a walk on even ground repeats at its end, and the step at which it leaves
+    its gait.
 
-    repeats_after  steps after which the last steps repeat, 0 if they do not
+    repeats_after  period in steps, 0 if the last steps do not repeat
     leaves_gait_at  number of the step at which a walk leaves the gait that it started on, or None if it stays or
                     started elsewhere
     """
@@ -381,7 +385,7 @@ def steps_to_repeat_last(steps: Floats) -> int:
 
 
 def steps_to_repeat(steps: Floats) -> int:
-    """Return the number of steps after which relative values of steps (steps, n) repeat, or 0 if they do not."""
+    """Return the period, in steps, of values (steps, n) relative to the first step, or 0 if they do not repeat."""
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         difference = np.abs(steps[period:] - steps[:-period]).max()
@@ -416,7 +420,7 @@ def summarise_walk(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_stride(walk: WalkRecord) -> dict[str, Any]:
-    """Return both steps of a walk's last stride and their differences, or an empty mapping without a stride."""
+    """Return both steps of a walk's last stride and their differences, or {} if the walk has no complete stride."""
     if walk.steps < STRIDE:
         return {}
     count = walk.steps - walk.steps % STRIDE  # even, because leg 1 swings in the first step of a stride
@@ -431,12 +435,13 @@ def last_stride(walk: WalkRecord) -> dict[str, Any]:
 
 
 def asymmetry_of(first: float, second: float) -> float:
-    """Return the difference between two values over their mean."""
+    """Return the difference between two values, divided by their mean."""
     return (second - first) / (0.5 * (first + second))
 
 
 def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the mean period (s) and length (m) of a walk's last stride, or those of its last step if it has none."""
+    """Return the mean period (s) and length (m) of a walk's last stride, or those of its last step if the walk has no
+    complete stride."""
     if "gait_steps" not in walk:
         return last_step(walk)
     return {"period_s": walk["step_period_s"], "length_m": walk["step_length_m"], "of_stride": True}

@@ -71,7 +71,7 @@ def brief(value: Any) -> str:
 
 
 NOT_THERE = "not there yet"
-"""Reason for running a stage without a stored result."""
+"""Reason given for running a stage that has no stored result yet."""
 
 LIMIT_BYTES = 1 << 30
 """Maximum size of an artifact. Larger files are not read."""
@@ -207,7 +207,10 @@ def read(path: Path) -> Stored:
 
 
 def check(path: Path, key: str | None = None, stage: str | None = None) -> Lookup:
-    """Check that the file at `path` is intact and, if they are given, belongs to `key` and `stage`. Raises no error."""
+    """Return whether the file at `path` is intact and belongs to `key` and `stage`, if given.
+
+    A damaged or missing file raises no error.
+    """
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -8,7 +8,10 @@ import subprocess
 from pathlib import Path
 
 FILE = "commit.txt"
-"""Name of the file with the commit, at a source distribution's root and in an installed package's metadata."""
+"""Name of the file that states the commit.
+
+It is at the root of a source distribution and in the metadata of an installed package.
+"""
 IN_METADATA = f"extra_metadata/{FILE}"
 SHIPPED = ("walkerlab", "configs")
 """Parts of a checkout that an installed package contains."""

@@ -1,4 +1,4 @@
-"""Content of results: a summary, and labelled arrays in groups. It knows nothing of files and HDF5."""
+"""Content of results: a summary, and labelled arrays in groups. It does not depend on files or HDF5."""
 
 import hashlib
 import math
@@ -34,7 +34,7 @@ class Variable:
     Raises ValueError or TypeError for values that cannot be stored faithfully.
     """
 
-    values: NDArray[Any]  # finite numbers, bools or texts; they are copied, widened to 64 bits and frozen
+    values: NDArray[Any]  # finite numbers, bools or strings; they are copied, widened to 64 bits and frozen
     # Name of each axis. A variable that is named like its only dimension is the coordinate of that dimension.
     dims: tuple[str, ...]
     units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text

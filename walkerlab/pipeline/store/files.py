@@ -1,5 +1,4 @@
-"""Write files atomically, explain errors of the file system, format CSV that is safe in a spreadsheet, and keep
-checkpoints.
+"""Write files atomically, explain file system errors, format CSV that is safe in a spreadsheet, and keep checkpoints.
 
 A checkpoint is a journal next to the artifact, from which an interrupted run resumes. The first line is the key of the
 result, and one line follows for each unit of work. Every line has a checksum. Lines are only appended, and an
@@ -81,10 +80,10 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
 
 def write_numbered(path: Path, text: str) -> Path:
-    """Write a text to a path that does not hold another text, and return this path.
+    """Write a text to `path`, or to a numbered path if `path` holds a different text, and return the path used.
 
-    If `path` holds another text, the next free one of `name-2`, `name-3`, ... is used. A file that holds the same text
-    is kept. Raises StorageError if the file cannot be written.
+    The numbered path is the first of `name-2`, `name-3`, ... that is free or holds the same text. A file that holds the
+    same text is kept. Raises StorageError if the file cannot be written.
     """
     for number in itertools.count(1):
         place = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
@@ -141,7 +140,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the disk has no room for `size` bytes, by trying to create a temporary file of this size."""
+    """Try to create a temporary file of `size` bytes, and raise OSError if the disk has no room for it."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -162,7 +161,7 @@ def make_folder(path: Path) -> None:
 def read_bounded(path: Path, limit: int) -> bytes:
     """Read a regular file of at most `limit` bytes.
 
-    Raises ValueError for other files, OSError if unreadable.
+    Raises ValueError for other files, and OSError if the file cannot be read.
     """
     # Without O_NONBLOCK, opening a pipe waits for a writer. Without O_BINARY, Windows changes bytes.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -221,7 +220,7 @@ Numbers = list[float]
 
 
 class Checkpoint:
-    """Numbers that the completed work units of a result have computed, by name of the unit."""
+    """Numbers computed by the completed work units of a result, by unit name."""
 
     def __init__(self, path: Path | None, key: str) -> None:
         """Resume from the journal at `path` if its key matches, otherwise start over with the first unit.
@@ -245,7 +244,7 @@ class Checkpoint:
                 self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
-        """Add the numbers of a unit.
+        """Store the numbers of a work unit.
 
         Raises StorageError if they cannot be stored.
         """

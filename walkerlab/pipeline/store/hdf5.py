@@ -129,7 +129,7 @@ def stored_bytes(values: NDArray[Any]) -> int:
 
 
 def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
-    """Encode an array of strings as UTF-8 of one length, padded with NUL."""
+    """Encode an array of strings as fixed-length UTF-8, padded with NUL."""
     # The type is not marked as UTF-8, because Octave stops at any text that is not marked as ASCII.
     texts = [text.encode() for text in values.ravel().tolist()]
     return np.array(texts, f"S{text_bytes(values)}").reshape(values.shape)
@@ -149,23 +149,23 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
     """Parse the groups, by path, and the root attributes of an untrusted HDF5 file.
 
     Data that declare more than the file can hold are not read. Raises ValueError for them and for content that `image`
-    cannot write, and the errors of the HDF5 library.
+    cannot write. Errors of the HDF5 library are passed on.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
         return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)
 
 
 class Budget:
-    """Number of bytes that the datasets not yet read may declare. A file cannot hold more data than its size."""
+    """Number of bytes that the unread datasets may still declare. A file cannot hold more bytes than its own size."""
 
     def __init__(self, size: int) -> None:
         """Set the budget to the size of the file, in bytes."""
         self.left = size
 
     def spend(self, size: int) -> None:
-        """Subtract declared bytes.
+        """Subtract bytes that the contents declare from the budget.
 
-        Raises ValueError if the contents declare more than the file holds.
+        Raises ValueError if they declare more than the file holds.
         """
         self.left -= size
         if self.left < 0:
@@ -248,7 +248,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read strings of variable length a few at a time, so that the budget also stops many references to one long
+    """Read strings of variable length a few at a time, so that the budget also catches many references to one long
     string."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)

@@ -32,7 +32,8 @@ class Provenance:
     platform: str  # operating system, processor, Python
     package_version: str
     library_versions: Mapping[str, str]
-    # commit of the source from which the package runs or was built, with '-dirty' if that was changed; None if unknown
+    # commit of the source from which the package runs or was built, with '-dirty' if the source had uncommitted
+    # changes; None if unknown
     git_commit: str | None = None
     input_digests: Mapping[str, str] = field(default_factory=dict)  # digest of each input's content, by stage
 

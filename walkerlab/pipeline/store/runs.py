@@ -113,7 +113,7 @@ class RunFolder:
             return None
 
     def worker(self) -> Holder | None:
-        """Return the process that works in the folder, or None if the folder is idle or the command is unknown."""
+        """Return the process that works in the folder, or None if the folder is idle or the record is unreadable."""
         try:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):
@@ -281,7 +281,7 @@ def refuse_another_config(folder: RunFolder, config: schema.Config) -> None:
 
 
 def is_of_same_config_file(record: Record, folder: RunFolder) -> bool:
-    """Whether a record has the config file and the run name of a folder. The file may have been edited since."""
+    """Whether a record names the same config file and run as a folder. The file may have been edited since."""
     return (record.run, record.source) == (folder.name, folder.source)
 
 

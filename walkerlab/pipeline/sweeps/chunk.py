@@ -71,8 +71,8 @@ def compute_point(
     key       stage key of the point's result
     again     whether to repeat the walk of the point to measure the numerical error
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
-    expected  versions of extensions in the calling process, which this process must have, too; None does not compare
-    them
+    expected  versions of extensions in the calling process, which must be the same in this process; None skips the
+              comparison
     """
     memory = input_cache(graph, forced)
     try:
@@ -172,7 +172,7 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 def stored_chunks(
     runs_dir: Path, stage: str, code_digest: str, keys: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
-    """Yield the stored results of a stage, in all run folders, that the present code has computed.
+    """Yield the stored results of a stage that the current code has computed, from all run folders.
 
     keys  stage keys of the sweep. Chunks are always included, results of single runs only if their keys are among these
     warn  called with a message about each damaged chunk

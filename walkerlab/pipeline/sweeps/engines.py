@@ -25,7 +25,7 @@ from walkerlab.private_files import make_private, make_private_folder, may_be_fo
 LISTING_S: Final = 5.0
 """Minimum time between two queries of Slurm's queue."""
 RESULT_S: Final = 30.0
-"""Time after a job's end in which its result may still appear on a network disk."""
+"""Time that a job's result may take to appear on a network disk after the job has ended."""
 RESTART_S: Final = 20.0
 """Time without a worker after which workers are started again. On its own, Dask takes some seconds to replace one."""
 SILENT_WORKER_S: Final = 600.0
@@ -148,7 +148,7 @@ class DaskWorkers:
                     self._seen_at = time.monotonic()
                 elif time.monotonic() - self._seen_at > RESTART_S:
                     self.cluster.scale(0)
-                    time.sleep(1.0)  # meanwhile the cluster forgets its closed workers
+                    time.sleep(1.0)  # gives the cluster time to forget its closed workers
                     self.cluster.scale(self.count)
                     self._seen_at = time.monotonic()
 
@@ -168,7 +168,7 @@ def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
     # submitit checks the types of options by assertions.
     except (AssertionError, RuntimeError, TypeError, ValueError, NotImplementedError) as error:
-        raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
+        raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it locally.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
     submit = functools.partial(job_runner.submit, run_until_signalled)
     executor = JobExecutor(submit, options.workers or 16, None if queue is None else queue.wait)
@@ -241,7 +241,7 @@ class SlurmQueue:
             now = time.monotonic()
             if now - self._listed_at >= LISTING_S:
                 self._listed_at = now
-                # With `all`, the list also shows finished jobs for some minutes.
+                # With `all`, the list keeps finished jobs for a few minutes.
                 command = ["squeue", "--noheader", "--me", "--states=all", "--format=%i %T"]
                 done = subprocess.run(command, capture_output=True, text=True, check=False)
                 if done.returncode == 0:
@@ -273,8 +273,8 @@ def private_jobs_folder(run_folder: Path) -> Path:
         make_private_folder(run_folder)
         if may_be_foreign(run_folder.resolve()):
             raise ConfigError(
-                f"--engine slurm: {run_folder} is open to other users or belongs to another user, and jobs are loaded "
-                "from there.",
+                f"--engine slurm: {run_folder} belongs to another user or is writable by others, which is unsafe "
+                "because jobs are loaded from it.",
                 f"Choose another folder with --runs, or close this one: chmod o-w {run_folder}",
             )
         if jobs.exists():
@@ -352,6 +352,6 @@ def parse_engine(text: str) -> tuple[SweepEngine, str]:
     # This mark shows that multiprocessing has started this process, which runs the calling script again.
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
-            "--engine dask: the processes that Dask starts run the calling script, which would sweep again.", GUARD
+            "--engine dask: Dask's processes run the calling script again, which would start another sweep.", GUARD
         )
     return ENGINES[name], address

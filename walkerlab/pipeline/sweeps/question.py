@@ -174,7 +174,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
             raise parameter_error(source, f"{key}: is a block of keys, not a value")
-        if not key.startswith("walker."):  # points may have other types of walkers, so each is checked
+        if not key.startswith("walker."):  # points may have different walker types, so each is checked
             raise parameter_error(source, f"{key}: unknown key", near=problems.nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
@@ -269,7 +269,7 @@ def described(config: schema.Config, key: str) -> tuple[str, str]:
 
 
 def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
-    """Raise ConfigError for a quantity that the stage never has, before anything is computed.
+    """Raise ConfigError for a quantity that the stage never has. This happens before anything is computed.
 
     names  requested quantities, by option as typed
     """

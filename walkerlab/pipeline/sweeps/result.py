@@ -158,7 +158,7 @@ class Merge:
         return artifact.InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe how walks ended, and whether the ground is why. Return [] for a stage that simulates no walk."""
+        """Describe how walks ended and whether the ground was the cause. Return [] if the stage simulates no walk."""
         outcomes = self.columns["outcome"].values[self.inverse]
         pads = None
         pitch = self.values_of("pitch_m")
@@ -209,7 +209,7 @@ class Merge:
 
 
 def last_numbers(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the last number of each row (..., numbers) that is not NaN, or NaN for an empty row."""
+    """Return the last number other than NaN in each row (..., numbers), or NaN if there is none."""
     counts = np.isfinite(rows).sum(axis=-1, keepdims=True)
     last = np.take_along_axis(rows, np.maximum(counts - 1, 0), axis=-1)
     return np.asarray(np.where(counts > 0, last, np.nan)[..., 0])

@@ -39,8 +39,8 @@ class SweepWork:
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
-    # Called after each chunk with an answer, with the names of all quantities so far. It raises an error to stop the
-    # sweep.
+    # Called with the names of all quantities so far, after each chunk that contains an answer. To stop the sweep, it
+    # raises an error.
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
@@ -276,7 +276,7 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
     """Raise ConfigError for a stage that cannot be swept."""
     can = [stage.name for stage in graph.stages if not stage.draws]
     if name not in can:
-        raise ConfigError(f"--stage {name}: cannot be swept.", f"Stages that can: {', '.join(can)}.")
+        raise ConfigError(f"--stage: {name} cannot be swept.", f"Stages that can be swept: {', '.join(can)}.")
 
 
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:

@@ -19,10 +19,9 @@ MAX_SILENCE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
 MIN_DONE_FRACTION = 0.1
-"""Minimum fraction of completed parts for a prediction of the remaining time, because the first parts are not
-typical."""
+"""The remaining time is predicted only after this fraction of the parts, because the first parts are not typical."""
 MIN_COMPUTED_S = 3.0
-"""Minimum computing time (s) for a prediction of the remaining time."""
+"""The remaining time is predicted only after this computing time (s)."""
 
 
 class Console:

@@ -38,7 +38,7 @@ class Target:
     """File, format and size of an export."""
 
     to: str | None  # format, or file name if `output` is None
-    output: Path | None  # file; None derives its name from the run
+    output: Path | None  # file, or None to derive its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
     columns: int = 1  # journal columns that a figure or a table for LaTeX spans
     width: float | None = None  # width (pt) of a figure; None for the width of `columns`
@@ -248,7 +248,7 @@ def figure(folder: runs.RunFolder, illustration: "Illustration", kind: str, targ
 
 
 def table(folder: runs.RunFolder, name: str, kind: str, console: Console) -> Table:
-    """Return a table of the paper's values, as records (csv) or as on the page (tex).
+    """Return a table of the paper's values, as records (csv) or laid out as on the report's page (tex).
 
     Raises ConfigError for other walkers.
     """
@@ -382,7 +382,7 @@ class Film:
 BOTH = "both"
 """Value of `Film.model` for both models in one picture."""
 MAX_GIF_RATE = 50
-"""Maximum frame rate (frames per second). Browsers show a frame shorter than 20 ms for 100 ms."""
+"""Maximum frame rate (frames per second). Browsers stretch a frame shorter than 20 ms to 100 ms."""
 
 
 def walk_in(folder: runs.RunFolder, model: str | None = None) -> str:
@@ -457,8 +457,8 @@ def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
-    # Many players show only yuv420p. The MP4 is fragmented, because ffmpeg cannot go back in a pipe to write the index
-    # of an ordinary MP4.
+    # Many players show only yuv420p. The MP4 is fragmented, because ffmpeg cannot seek back in a pipe to write the
+    # index of an ordinary MP4.
     coded = ["-pix_fmt", "yuv420p", "-movflags", "frag_keyframe+empty_moov", "-f", "mp4", "-"]
     command = [ffmpeg, "-loglevel", "error", *raw, *coded]
     done = subprocess.run(command, input=b"".join(map(bytes, frames)), capture_output=True, check=False)

@@ -23,7 +23,7 @@ STAGE_NAMES = ", ".join(PIPELINE.names)
 def status(
     request: Request,
     run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="Name or folder of a run.")] = None,
-    check: Annotated[bool, typer.Option("--check", help="Exit with 5 if a result is stale or missing.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Exit with code 5 if a result is stale or missing.")] = False,
 ) -> None:
     """Show which results are up to date, why others are not, and all runs."""
     from walkerlab.views.cli.stored import print_status

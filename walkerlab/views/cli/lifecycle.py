@@ -34,7 +34,7 @@ def init(
     ] = "compass",
     checks: Annotated[bool, typer.Option("--check", help="Add a `check` block for a printed gait.")] = False,
 ) -> None:
-    """Write a commented config to start from, and a schema for checks in editors."""
+    """Write a commented config to start from, and a schema with which editors can check it."""
     from walkerlab.views.cli.init import write_config
 
     message = write_config(file or Path(f"my-{walker}.yaml"), walker, checks)
@@ -82,7 +82,7 @@ def export(
     what: Annotated[str, typer.Argument(metavar="WHAT", help=ITEM_EXAMPLES)],
     to: Annotated[
         str | None,
-        typer.Option(metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."),
+        typer.Option(metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; for a model adm, cmd or mjcf."),
     ] = None,
     output: Output = None,
     columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure or LaTeX table fills.")] = 1,
@@ -100,7 +100,7 @@ def export(
     ] = None,
     slope: Annotated[
         str | None,
-        typer.Option(metavar="HOW", help="Slope in MuJoCo: gravity (tilted, default) or geometry (tilted ground)."),
+        typer.Option(metavar="HOW", help="What MuJoCo tilts for a slope: gravity (default) or geometry (the ground)."),
     ] = None,
 ) -> None:
     """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""

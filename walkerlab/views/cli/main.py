@@ -67,7 +67,7 @@ GROUPS = {
     ),
     "Keep house": ("status", "show", "schema", "extensions", "rerun", "compile", "clean"),
 }  # fmt: skip
-"""Commands by purpose, in the order of the help, which lists commands without a group in the last one."""
+"""Commands by purpose, in the order of the help. The help adds commands without a group to the last group."""
 
 
 class Commands(TyperGroup):

@@ -193,7 +193,7 @@ class Request:
 RUN_OPTIONS = ("config", "sets", "strides", "name", "runs")
 """Options that select the run."""
 OUTPUT_FIELDS = ("as_json", "quiet", "verbose")
-"""Options for the form and the amount of output."""
+"""Options for the format and the amount of output."""
 
 
 FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -213,7 +213,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         Returns the exception that ends the command with the failure's exit code.
         """
         if request.as_json:
-            # The failure may be that the run could not be resolved.
+            # If resolving the run is what failed, it has no folder.
             run_dir = str(request.folder.path) if "resolved_run" in vars(request) else None
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
             print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})

@@ -52,7 +52,8 @@ class Job:
         self._process: subprocess.Popen[str] | None = None
         self._runs = Path()
         self._lock = threading.Lock()
-        # Latest progress message and, as soon as the file exists, its address. A change replaces the dictionary.
+        # Latest progress message and, once the report or animation exists, its address. The dictionary is replaced,
+        # never modified.
         self.status: dict[str, Any] = {"running": False}
 
     def begin(self, kind: object, question: ExploredConfig) -> Answered:
@@ -212,7 +213,7 @@ class Desk:
         with self._count:
             self._newest += 1
             number = self._newest
-        # The worker is busy with an earlier request, and nobody waits for that any more.
+        # The worker is busy with an earlier request that nobody is waiting for any more.
         if self.drops and self._turn.locked():
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:

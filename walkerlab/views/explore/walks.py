@@ -119,7 +119,7 @@ def input_of(key: str, first: Any, unit: str, field: FieldInfo, start: schema.Co
 
 
 def ordinary_size(key: str, unit: str, start: schema.Config) -> float:
-    """Return the typical size that a quantity with this unit has in the walker, or 0 if it is unknown."""
+    """Return the typical magnitude, for this walker, of a quantity with this unit, or 0 if it is unknown."""
     mass = start.walker.total_mass_kg
     leg = start.walker.leg_length_m
     gravity = start.gravity_m_s2
@@ -171,7 +171,7 @@ class SupersededError(BaseException):
 class GivingWay(Silent):
     """Progress reporter that abandons a request when a newer one is waiting, but only between two gaits.
 
-    Acting on the signal at once could interrupt an import.
+    Abandoning it at once could interrupt an import.
     """
 
     def __init__(self) -> None:
@@ -238,7 +238,7 @@ MEMORY = results.MemoryResults()
 
 
 def walk(question: ExploredConfig) -> Answered:
-    """Compute the gait and the walks of a config, and the data with which the player shows them."""
+    """Compute the gait and the walks of a config, and the data that the player needs to show them."""
     try:
         loaded = question.loaded
         config = loaded.config

@@ -33,8 +33,8 @@ def quantities(steps: Group) -> list[str]:
 
 
 def draw_steps(results: Results) -> Drawn:
-    """Plot measured values of steps over predicted ones. The caption gives the number of steps and the fraction in the
-    bands."""
+    """Plot the measured and the predicted values of each step. The caption gives the number of steps and the fraction
+    inside the bands."""
     steps = results[IDENTIFY_STAGE].groups["steps"]
     names = quantities(steps)
     number = 1 + steps["step"]

@@ -60,7 +60,10 @@ class Illustration:
     texts: Mapping[str, str] = field(default_factory=dict)
 
     def say(self, what: str, *values: Any) -> str:
-        """Return a text: title, caption or, as `seen`, the text alternative of one or two sentences, or ''."""
+        """Return one of the figure's texts, or '' if it has none.
+
+        what  title, caption or seen (the text alternative, in one or two sentences)
+        """
         if self.texts:
             return self.texts.get(what, "").format(*values)
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)

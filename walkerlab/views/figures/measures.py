@@ -86,7 +86,8 @@ def entry(key: str, value: float) -> str:
 
 
 def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
-    """Return the labels of a body's mass and, if it has one, of its inertia. `prefix` begins its config keys."""
+    """Return the labels of a body's mass and, if it has one, of its inertia. The body's config keys start with
+    `prefix`."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
     mass = entry(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
     return (mass, entry(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
@@ -170,7 +171,7 @@ class View:
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
     heights: list[float]  # height of each of these labels
-    lanes: list[list[Length]]  # vertical dimensions ahead of the leg, by lane
+    lanes: list[list[Length]]  # vertical dimension lines in front of the leg, one list per lane
     ahead: list[int]  # number of characters that fit in each lane
     left: float
     width: float
@@ -281,7 +282,7 @@ def draw_sole(axes: Axes, centre: Point, radius: float, angles: NDArray[np.float
 
 
 def rotate(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
-    """Rotate a point about `origin` by `angle` (rad), then move `origin` to `moved_to`."""
+    """Rotate a point about `origin` by `angle` (rad), then shift it by `moved_to` minus `origin`."""
     (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 

@@ -57,7 +57,7 @@ def run(
             drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))
             progress.advance()
         else:
-            # Files of the figure may be left from results that no longer exist.
+            # Files of the figure may be left over from results that no longer exist.
             for path in paths_of(figure.name).values():
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)

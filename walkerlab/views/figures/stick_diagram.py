@@ -45,11 +45,11 @@ SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 ROOM_BELOW = 0.36
-"""Space (in) for landing times below the lowest foot."""
+"""Space (inches) for landing times below the lowest foot."""
 SIDE_INCHES = 0.7
-"""Space (in) for axis labels at the side."""
+"""Space (inches) for axis labels at the side."""
 ROOM_ABOVE = 1.05
-"""Space (in) for the legend."""
+"""Space (inches) for the legend."""
 MAX_ASPECT = 0.68
 """Maximum height of the axes relative to their width."""
 
@@ -92,7 +92,8 @@ class Sticks:
         return max(self.radii) > SMALL_FOOT * self.leg_length
 
     def leg(self, leg: int) -> walks.Array:
-        """Return a leg's line (samples, points, 2) from the hip through any knee to the middle of the sole."""
+        """Return a leg's line (samples, points, 2) from the hip, through the knee if there is one, to the
+        middle of the sole."""
         joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
         return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
 
@@ -256,7 +257,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 
 
 def entries(sticks: Sticks) -> list[Artist]:
-    """Return the legend entries of the legs, the hip and any torso."""
+    """Return the legend entries for the legs, the hip and, if there is one, the torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
     strike = entry("at heel strike", color=GREY, linewidth=BOLD_WIDTH)
     between = entry("between", color=GREY, linewidth=FAINT_WIDTH)
@@ -313,7 +314,7 @@ FILM_NEEDS = {
     stage: illustration.Need(stage, walks.TRAJECTORY, (*walks.STATE_VARIABLES, *walks.JOINTS), walks.NO_STATES)
     for stage in (RIGID_STAGE, CONTACT_STAGE)
 }
-"""Variables that an animation needs. None are of the group `steps`, because a walk can end in its first step."""
+"""Variables that an animation needs. None belongs to the group `steps`, because a walk can end in its first step."""
 FIGURES = tuple(
     illustration.paper_figure(number, (FILM_NEEDS[stage], walks.STEPS_TAKEN[stage]), partial(draw_cycle, stage))
     for number, stage in ((2, RIGID_STAGE), (6, CONTACT_STAGE))
@@ -324,7 +325,7 @@ PUSH_SHOWN_S = 0.08
 PUSH_SHARE = 0.3
 """Length of the mark of a push-off relative to the leg."""
 FILM_SIZE = (6.4, 3.6)
-"""Size of a frame (in). Video formats require an even number of pixels along both sides."""
+"""Size of a frame (inches). Video formats require an even number of pixels along both sides."""
 FILM_DPI = 100
 """Resolution of a frame, pixels per inch."""
 STEPS_SHOWN = 4
@@ -337,7 +338,8 @@ RELIEF_DEPTH = 0.075
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> walks.Array:
     """Return the times (s) of an animation's frames. The last frame of a fall lasts a second, so that it can be seen.
 
-    steps   number of steps shown, from the first; None for four or, if the walker falls, the last four and the fall
+    steps   number of steps shown, from the first; None shows the first four or, if the walker falls, the last four and
+            the fall
     rate    frames per second
     slower  slow-motion factor
     """

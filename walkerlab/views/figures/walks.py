@@ -313,13 +313,13 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
 SHOWN_STRIDES = 2
-"""Number of strides in the figure of forces. With more of them, single impacts could not be told apart."""
+"""Number of strides in the figure of forces. With more strides, single impacts could not be told apart."""
 SHOWN_STEPS = 40
 """Number of steps in the figure of energy losses."""
 SHOWN_LOADS: Final = 0.99
 """The force axis covers this fraction of the loaded samples. It leaves out impacts of many times the weight."""
 NEGLIGIBLE_LOSS: Final = 1e-3
-"""Fraction of the energy lost below which a cause is not drawn."""
+"""A cause is drawn only if its largest loss in a step is at least this fraction of the largest total loss."""
 
 
 def draw_forces(results: Results) -> Drawn:
@@ -351,7 +351,7 @@ def draw_forces(results: Results) -> Drawn:
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
-    # Otherwise the axis would begin and end at zero if there is no friction.
+    # Without friction, the axis would otherwise begin and end at zero.
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
     of_normal = walk.label("normal force", NORMAL_FORCE)
@@ -372,8 +372,8 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost in each step by cause (label, colour). What no other cause explains is lost in the
-    knees."""
+    """Return the energy (J) lost in each step by cause (label, colour). Losses that no other cause explains are
+    attributed to the knees."""
     # Steps are divided at the last sample before a touchdown, so that the whole impact belongs to the step that it
     # starts.
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))

@@ -29,7 +29,7 @@ FIRST_VALUES = 4
 LAST_VALUES = 6
 """Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
-"""A sentence lists the step periods of cycles of at most this many steps."""
+"""Longest cycle (steps) whose step periods are listed in a sentence."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
@@ -155,7 +155,7 @@ def each_step(summary: Summary) -> dict[str, Summary]:
 
 
 def settling_sentences(summary: Summary) -> Iterator[str]:
-    """Yield sentences about the gait that a walk leaves, and about the cycle of steps with which it ends."""
+    """Yield sentences about the unstable gait from which a walk departs, and about the cycle of steps it ends in."""
     from walkerlab.views.report.sections.walks import format_step
 
     steps = summary["steps"]
@@ -201,7 +201,7 @@ LAST_STEP = (
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
     """Tabulate the last step of each model, the step of the gait and, if there are knees, the last step for each
-    instant of release."""
+    instant at which the knee may be released."""
     steps = []
     for name, step in summary["steps"].items():
         known_errors = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}

@@ -151,7 +151,7 @@ class Player:
     torso_m: float = 0.0
     ordinary_force: float = 1.0  # force (N) that an arrow of the standard length shows
     pads: tuple[Pad, ...] = ()
-    ground: tuple[tuple[float, float], ...] = ()  # start along the slope and height of each ground level (m)
+    ground: tuple[tuple[float, float], ...] = ()  # where each ground level starts along the slope, and its height (m)
 
     @property
     def slope_deg(self) -> float:

@@ -136,8 +136,8 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """Copy an element and its children, with only the ids in `used`, or return an empty text if the element is not
-    allowed."""
+    """Copy an element and its children, keeping only the ids in `used`, or return an empty string if the element is
+    not allowed."""
     name = element.tag.removeprefix(SVG)
     if name not in SVG_ELEMENTS:
         return Markup("")
@@ -156,7 +156,7 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
 
 
 def text_content(text: str | None, name: str) -> Markup:
-    """Escape the text of a text element, or return an empty text for another element."""
+    """Escape the text of a text element, or return an empty string for any other element."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
@@ -211,12 +211,12 @@ def render(page: Page) -> str:
 
 
 def digest_of(script: str) -> str:
-    """Return the hash by which the content security policy of a page recognises the script of the page."""
+    """Return the hash by which a page's content security policy allows its script."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def environment(run: str = "") -> Environment:
-    """Create the template environment, which escapes all texts and adds the run's options to suggested commands."""
+    """Create the template environment, which escapes all text and adds the run's options to suggested commands."""
     template_environment = Environment(
         loader=FileSystemLoader(TEMPLATE_FOLDER),
         autoescape=True,

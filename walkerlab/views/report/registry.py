@@ -1,7 +1,8 @@
 """The sections of the report in order, including those of extensions.
 
 Each entry is a function that builds a `Section` from the results, or returns None if it has nothing to show. It reads
-`Results.summary(stage)` and `Results.group(stage, path)`. If the stage did not run, they are empty and None.
+`Results.summary(stage)` and `Results.group(stage, path)`. If the stage did not run, the summary is empty and
+the group is None.
 """
 
 import math
@@ -26,7 +27,7 @@ from walkerlab.views.report.words import words
 
 
 def added_sections(slot: str) -> tuple[SectionMaker, ...]:
-    """Return the functions that build the sections that extensions add at a position (`SLOTS`) of the page."""
+    """Return the functions that build the extensions' sections at a position (`SLOTS`) of the page."""
     return tuple(load(maker) for extension in extensions().values() for maker in extension.sections.get(slot, ()))
 
 

@@ -1,4 +1,4 @@
-"""Tables, declared once by columns and records, for pages, terminal and CSV, and summaries as text."""
+"""Tables for pages, terminal and CSV, each declared once by its columns and records, and summaries as text."""
 
 import re
 import textwrap
@@ -15,7 +15,7 @@ from walkerlab.views.report.numbers import NONE, number
 Tone = Literal["plain", "good", "fair", "bad", "given"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
-"""Number of characters of a cell above which its column is treated as text."""
+"""If a cell has more characters than this, its column is treated as text."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
 """Pattern of numbers without unit or words."""
 
@@ -30,7 +30,7 @@ class Cell:
 
     @property
     def datum(self) -> Any:
-        """Content of the cell in a file: the value that the text shows if there is one, otherwise the text.
+        """Content of the cell in an exported table: the value that the text shows if there is one, otherwise the text.
 
         None if the text is empty.
         """
@@ -53,7 +53,7 @@ class Column:
     title: str  # header, with the unit
     # key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows of cells
     of: str | Callable[[Any], Any] | None = None
-    # formats a value as text, or as a cell with a tone; a value that is a cell is kept as it is
+    # formats a value as text or as a cell with a tone; values that are already cells are not changed
     written: Callable[[Any], str | Cell] = format_plain
     numeric: bool = False  # whether to align as numbers
     wide: bool = False  # whether cells hold sentences; a terminal does not show such columns
@@ -77,8 +77,8 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """Return a column of numbers in a unit with a `prefix`, such as m. The unit comes from `labels` or the key's
-    suffix."""
+    """Return a column of numbers in a unit with a `prefix`, such as m for milli. The unit comes from `labels` or the
+    key's suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
 
     def scaled(record: Mapping[str, Any]) -> Any:
@@ -168,7 +168,8 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
 
 
 def flatten(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Return header and rows. Titles of groups, if any, are in a first column. `wide` includes columns of sentences."""
+    """Return the header and the rows. If there are group titles, they form the first column. `wide` includes columns
+    of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
     heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]
@@ -208,7 +209,7 @@ INDENT = "  "
 PARAGRAPH_WIDTH = 100
 """Line width of a paragraph (characters)."""
 LONGEST_ROW = 12
-"""Maximum number of values of a row that is shown in full."""
+"""A row with at most this many values is shown in full."""
 ENDS = 4
 """Number of values shown at each end of a longer row."""
 

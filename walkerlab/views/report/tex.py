@@ -1,4 +1,5 @@
-"""Format tables for LaTeX: aligned decimals, equal digits in a column, headers and captions with symbols."""
+"""Format tables for LaTeX: aligned decimals, the same number of digits throughout a column, headers and captions with
+symbols."""
 
 import math
 import re
@@ -21,7 +22,7 @@ SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}
 MIN_HEAD: Final = 10
 """Number of characters of a column heading that always fit on one line."""
 MAX_UNWRAPPED: Final = 28
-"""Number of characters of a cell above which the column is wrapped."""
+"""A column of text is wrapped if one of its cells has more characters than this."""
 WRAPPED: Final = r">{\raggedright\arraybackslash}p{11em}"
 TYPE_SIZES: Final = {"": 1.0, r"\small": 0.9, r"\footnotesize": 0.8, r"\scriptsize": 0.7}
 CHARACTER_PT: Final = 5.0
@@ -53,7 +54,8 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 
 
 def as_tex(content: Table, columns: int = 1) -> bytes:
-    """Format a table, without columns of sentences, for booktabs and siunitx. If it has a caption, it becomes a float.
+    """Format a table for booktabs and siunitx, leaving out columns of sentences. A table with a caption becomes a
+    float.
 
     columns  journal columns that the table spans, which determine the size of its type
     """
@@ -81,8 +83,7 @@ def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
 
 
 def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return the lines of the head of each column. Words are wrapped to the column, and a unit has a line of its
-    own."""
+    """Return the header lines of each column. Words are wrapped to the column, and a unit has a line of its own."""
     parts = [TITLE.fullmatch(title) for title in titles]
     has_units = any(part and part["unit"] for part in parts)
     heads = []
@@ -99,7 +100,7 @@ def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Seq
 
 
 def format_column(data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Return layout and cells of a column. For numbers, it is a siunitx column, aligned at the decimal point."""
+    """Return the layout and the cells of a column. Numbers form a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else escape_tex(value) for value in data]
@@ -117,7 +118,7 @@ def is_number(value: Any) -> bool:
 
 
 def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
-    """Choose the format of a column's numbers: integers, or equally many decimals or significant digits."""
+    """Choose the format of a column's numbers: integers, or the same number of decimals or of significant digits."""
     if all(isinstance(value, int) for value in numbers):
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
@@ -141,7 +142,8 @@ def room_for(cells: Sequence[str]) -> str:
 
 
 def escape_tex(value: Any) -> str:
-    """Convert a text to LaTeX, with symbols and powers in maths and special characters escaped, or None to a dash."""
+    """Convert a text to LaTeX: set symbols and powers in maths mode, and escape special characters. None becomes a
+    dash."""
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))

@@ -21,7 +21,7 @@ LEG_CHANNELS = {
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
 }  # fmt: skip
-"""Channel of each stored variable that has a value for each leg. The index of the leg is appended to it."""
+"""Channel of each stored variable that has a value for each leg. The leg's index is appended to the channel's name."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]

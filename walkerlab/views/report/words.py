@@ -14,7 +14,7 @@ from walkerlab.views.report.numbers import count, number, quantity, typeset
 from walkerlab.views.report.tables import Tone
 
 MODEL_NAMES = {RIGID_STAGE: "Rigid model", CONTACT_STAGE: "Contact model"}
-"""Stages that simulate a walk, with the name of the model."""
+"""Names of the models, by the stage that simulates a walk with them."""
 
 WALKED_LABEL = Outcome.WALKED.label
 

@@ -101,7 +101,7 @@ SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  #
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adaptive integrators
-ERROR_GOAL = 1e-5  # stop refining once the error under our law is below this
+ERROR_GOAL = 1e-5  # stop refining once the error with our contact law is below this
 SETTLED_CHANGE = 1e-4  # stop refining once the period on native contact changes by less (relative)
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
 START_FACTORS = (0.95, 0.99)  # factors applied to the velocities of the gait, for walks from other starts
@@ -117,7 +117,7 @@ ADAMS_RTOL = 1e-7  # relative tolerance of our walk for comparison with the nati
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
-# On its native contact an engine's walk may last longer than ours, so the step budget is multiplied by this.
+# With its native contact, an engine's walk may take longer than ours, so the step budget is multiplied by this.
 STEP_ALLOWANCE = 2
 OUR_REPEATS = 3
 
@@ -180,8 +180,8 @@ class EngineExperiment:
         integrator  name of the integrator or contact model
         start       factor applied to the gait's initial velocities
         """
-        # Under our law, the errors are those of the end state and of the touch times. On native contact, the error is
-        # that of the last period, and only a completed walk from the gait has one.
+        # With our contact law, the errors are those of the end state and of the touch times. With native contact, the
+        # error is that of the last period, and only a completed walk from the gait has one.
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s = stepping.step_s
         tolerance = stepping.tolerance
@@ -270,7 +270,7 @@ class EngineOnScene:
         """Simulate a walk of at most `max_steps` engine steps.
 
         label   name of the integrator or contact model in the row
-        native  the engine's native contact, or None for our law
+        native  the engine's native contact, or None for our contact law
         start   factor applied to the gait's initial velocities
         """
         law, until_s = (SAME_LAW, self.truth.until_s) if native is None else (OWN_LAW, UNLIMITED_S)
@@ -281,7 +281,7 @@ class EngineOnScene:
         return experiment.row(label, stepping, answer, start), answer
 
     def same_law(self) -> Iterator[EngineRow]:
-        """Yield runs of each integrator under our law, from coarse to fine."""
+        """Yield runs of each integrator with our contact law, from coarse to fine."""
         for name, integrator in self.engine.adapter().INTEGRATORS.items():
             if integrator.for_contact_only:
                 continue
@@ -375,7 +375,7 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """Integrate the swing by our equations and SciPy's DOP853.
+    """Integrate the swing with our equations and SciPy's DOP853.
 
     Returns the end state, and a function for the energy (J) of a state.
     """

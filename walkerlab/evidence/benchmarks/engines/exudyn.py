@@ -90,7 +90,7 @@ class ExudynRun(adapter.Simulation):
         # Without the small margin, rounding could add a step.
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
-        stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods keep their step
+        stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods have a fixed step size
         # No iterations: contact is detected at the end of a step, as in any explicit method.
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
@@ -152,7 +152,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
 def add_contacts(
     system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact
 ) -> Iterator[Any]:
-    """Add a contact between each foot and a large triangle, and yield its object number.
+    """Add a contact between each foot and a large triangle, and yield the contact's object number.
 
     places  joint index of each link, as returned by `add_tree`
     """

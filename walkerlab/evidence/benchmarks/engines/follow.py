@@ -162,7 +162,7 @@ class RuleFollower:
             new = now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
-            # Engines have no states within a step, so the walker moves back from the end at its velocities there.
+            # Engines have no states within a step, so extrapolate back from the end with the velocities there.
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
             time_at_event = self.time_s + share * h
             if above:

@@ -29,7 +29,8 @@ class MujocoRun(adapter.Simulation):
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         import mujoco
 
-        mujoco.set_mjcb_passive(None)  # the callback is global, so that of the last run would still act
+        # The callback is global, so without this the previous run's callback would still be active.
+        mujoco.set_mjcb_passive(None)
         self._advance = mujoco.mj_step
         self._model = mujoco.MjModel.from_xml_string(model_xml(model, self.own))
         self._model.opt.timestep = self.stepping.step_s

@@ -19,9 +19,10 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name of the engine in the output, and of its adapter module and the distribution to install
+    # name of the engine in the output; its adapter module and the distribution to install have the same name
+    name: str
     module: str  # import name of its package
-    core: str = ""  # distribution of the library itself, if it can be installed alone
+    core: str = ""  # distribution that contains the library itself, if it can be installed without `name`
 
     @property
     def is_installed(self) -> bool:

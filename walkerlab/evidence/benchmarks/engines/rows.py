@@ -23,18 +23,18 @@ class EngineRow:
     experiment: Annotated[str, Label("1", "experiment")]
     integrator: Annotated[str, Label("1", "integrator, or the engine's own contact model")]
     start: Annotated[float, Label("1", "start velocities relative to the gait's")]
-    # for an adaptive run that was lost, the largest step allowed
+    # if an adaptive run failed, this is the largest step allowed
     step_s: Annotated[float, Label("s", "step size, or its mean for adaptive integrators")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
-    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop, or None if the process was lost
+    wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop, or None if the process failed
     period_s: Annotated[float | None, Label("s", "period of the last step")]
     step_length_m: Annotated[float | None, Label("m", "length of the last step")]
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]
     steps: Annotated[int, Label("1", "steps walked")]
     outcome: Annotated[str, Label("1", "outcome")]
-    why: str = ""  # error message of a lost run
+    why: str = ""  # error message of a failed run
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class SwingRow:
     engine: Annotated[str, Label("1", "engine")]
     integrator: Annotated[str, Label("1", "integrator")]
     promised_order: Annotated[int, Label("1", "nominal order")]
-    step_s: Annotated[float, Label("s", "step size, or the largest for adaptive integrators")]
+    step_s: Annotated[float, Label("s", "step size, or the maximum step size of an adaptive integrator")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float, Label("1", "largest difference of the end state, rad and rad/s")]
     energy_drift_j: Annotated[float, Label("J", "change of the mechanical energy")]
-    order: Annotated[float | None, Label("1", "observed order, from this run and the one with twice the step")]
+    order: Annotated[float | None, Label("1", "observed order, from this run and the one with twice the step size")]
     wall_s: Annotated[float, RUN_TIME]
 
 

@@ -40,14 +40,14 @@ class WalkAnswer:
 
 @dataclass(frozen=True)
 class WalkTask:
-    """A walk with the integrator of an engine, on our contact law or on that of the engine."""
+    """A walk simulated with an engine's integrator, with our contact law or with the engine's native contact."""
 
     engine: str
     stepping: Stepping
     scene: EngineScene
     touches: int  # number of touches after which the walk ends
     until_s: float  # latest time at which the walk ends
-    own: OwnContact | None  # the engine's tuned contact, or None for our law
+    own: OwnContact | None  # the engine's tuned contact, or None for our contact law
     max_steps: int  # step budget of the engine
 
     def run(self) -> WalkAnswer:
@@ -87,7 +87,7 @@ class EngineWalk:
         while rules.outcome is None and not self.is_over and self.steps < self.task.max_steps:
             self._simulate(self.task.until_s)
             if rules.turn is not None:
-                # The shortened step ends at this turn, which must not stop it again.
+                # The shortened step ends at the knee event just found, so do not stop at that event again.
                 rules.watches = False
                 wait_s = rules.turn.share * (self.seen_s - self.time_s)
                 if wait_s > TIME_ROUNDING * self.task.stepping.step_s:
@@ -265,7 +265,7 @@ class TuningTask:
         omega = self.omega
         motion = self.simulate_contact(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
-        # Engines integrate by different rules, so we take the mean of both ends of a step for its middle.
+        # Engines integrate by different rules, so we use the mean of a step's two ends as its midpoint.
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
         (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
         stiffness = k / depth

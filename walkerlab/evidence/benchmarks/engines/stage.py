@@ -53,7 +53,7 @@ def supported_scene(
     points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
     if any(points) and not all(points):
         raise ConfigError(
-            "engines: a point foot and a round foot need ground at two heights, because a ball replaces the point.",
+            "engines: a small ball replaces the point foot, so the two feet need ground at different heights.",
             f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)
@@ -200,7 +200,7 @@ def series_by_name(rows: Sequence[EngineRow], experiment: str) -> dict[str, list
 
 
 def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
-    """Return the run time of each engine under our law, divided by ours, for each error level that both reach."""
+    """Return the run time of each engine with our contact law, divided by ours, for each error level both reach."""
     by_engine: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.experiment == SAME_LAW and row.start == 1.0:
@@ -217,7 +217,8 @@ def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
 
 
 def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
-    """Return the native contact whose finest walk is closest to ADAMS's law, or None if no walk is completed."""
+    """Return the native contact whose walk at the finest step is closest to that of ADAMS's law, or None if no walk was
+    completed."""
     finest = [series[-1] for series in series_by_name(rows, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
@@ -227,9 +228,9 @@ def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
 
 
 def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
-    """Return the largest step (s) with three correct digits of the last period, by experiment and name of series."""
-    # Under our law, correct digits are counted against the reference. Native contact has no reference, so they are
-    # counted against its finest run.
+    """Return the largest step (s) that gives three correct digits of the last period, by experiment and series name."""
+    # With our contact law, correct digits are counted against the reference. Native contact has no reference, so they
+    # are counted against its finest run.
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
@@ -257,7 +258,7 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
 def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
     """Return the effect of the last refinement of each series, by experiment and name of the series.
 
-    Under our law it is the factor by which the error fell, and on native contact the change of the period (s).
+    With our contact law it is the factor by which the error fell, and with native contact the change of the period (s).
     """
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():

@@ -1,6 +1,6 @@
 """Templates for texts about the paper. They can use its printed values, and functions that derive others from them.
 
-This is a separate package, so that a change of words affects only the results of modules that import it.
+This is a separate package, so that rewording a text affects only the results of modules that import it.
 """
 
 import math

@@ -73,7 +73,7 @@ LOSS_HEADS = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Label of each energy loss per step, and what the table shows for the rigid model, by stored name."""
+"""For each energy loss per step, by its stored name: its label, and what the table shows for the rigid model."""
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:

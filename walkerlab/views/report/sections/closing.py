@@ -14,7 +14,7 @@ from walkerlab.views.report.words import words
 
 
 def provenance_section(results: Results) -> Section | None:
-    # Other results have no provenance.
+    # Only stored results have a provenance.
     stored = [result for result in results.stored.values() if isinstance(result, Stored)]
     note = "A key covers config, inputs and code. Equal keys give equal digests. Neither includes timings."
     blocks = (
@@ -68,7 +68,7 @@ TITLES = {
 
 
 def link_pages(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
-    """Link to the further pages with the findings of their sections, and announce pending results."""
+    """Link to the further pages, quote the findings of their sections, and announce pending results."""
     items = []
     for file, sections in pages.items():
         findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
@@ -94,12 +94,13 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """For each reason, yield a row with the results that it affects. If others need these, a second row has them.
+    """For each reason, yield a row with the results that it affects directly and, if there are any, one with those that
+    need them.
 
     A row has the results, the reason, and what leaving them out saves.
     """
     reasons = {absent.why for absent in missing}
-    # The actual reason comes last, such as 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'.
+    # The actual reason comes last: in 'it needs simulate: it needs fixedpoint: no gait', it is 'no gait'.
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for reason in dict.fromkeys(causes.values()):
         same_reason = [absent for absent in missing if absent.why == reason]

@@ -140,7 +140,10 @@ def separate_marks(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
 def curves(
     branch: Group, across: DiagramAxis, up: DiagramAxis
 ) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
-    """Yield one line (points, stable) per step of the gaits, for each stretch of stable or of unstable gaits."""
+    """Yield lines (points, stable) of step period over parameter.
+
+    Each stretch of stable or of unstable gaits has one line for every step of a gait.
+    """
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):

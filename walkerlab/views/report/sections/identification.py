@@ -143,7 +143,7 @@ def decimals_of(error: float) -> int:
 
 
 def unit_ending(unit: str) -> str:
-    """Return a unit as it follows a number in a sentence, with a space."""
+    """Return a unit as written after a number in a sentence, including the space if there is one."""
     return {"deg": " degrees", "1": "", "": ""}.get(unit, f" {unit}")
 
 
@@ -211,7 +211,8 @@ def label_combination(combination: str, keys: Sequence[str]) -> str:
 
 
 def contradicted_priors(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
-    """Return label and value of each prior that the walk contradicts, and the distance in standard errors."""
+    """Return the label and value of each prior that the walk contradicts, and its distance from the estimate based on
+    the walk alone, in standard errors."""
     return [
         (axis_label(row["key"]), value_and_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
         for row in priors
@@ -269,7 +270,7 @@ def plan_section(_results: Results, summary: Mapping[str, Any]) -> Section | Non
 
 
 def plan_findings(summary: Mapping[str, Any]) -> list[str]:
-    """Return the answer in sentences: the simplest measurement, the steps for each target error, and the
+    """Summarise the plan in sentences: the simplest measurement, the number of steps for each target error, and the
     assumptions."""
     rows = summary["measurements"]
     targets = [place for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry]

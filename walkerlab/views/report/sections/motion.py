@@ -83,7 +83,7 @@ def overlay(results: Results) -> Player | None:
 
 def walker(results: Results, stage: str, track: Track) -> Walker:
     summary = results.summary(stage)
-    # The strike at which the track was cut must not be dropped because of rounding.
+    # Rounding must not drop the strike at which the track was cut.
     strikes = [time for time in summary["touch_times_s"] if time <= track.end + 1e-9]
     return Walker(
         name=MODEL_NAMES[stage],

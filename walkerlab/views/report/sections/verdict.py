@@ -33,7 +33,8 @@ RELEASE_COLUMNS = (
 
 
 def models_section(results: Results) -> Section | None:
-    """Tabulate the largest differences of the legs' motions and, with knees, the effect of the release instant."""
+    """Tabulate the largest differences between the leg motions of the two models and, with knees, the effect of the
+    release instant."""
     summary = results.summary("compare")
     angle = summary.get("max_angle_error_rad")
     velocity = summary.get("max_velocity_error_rad_s")

@@ -101,9 +101,9 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 
 
 HEAD_STEPS = 20
-"""Number of steps at the beginning of a long walk that are listed."""
+"""The table of a long walk lists this many steps at its beginning."""
 TAIL_STEPS = 4
-"""Number of steps at the end of a long walk that are listed."""
+"""The table of a long walk lists this many steps at its end."""
 SERIES = {
     (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
     (CONTACT_STAGE, "step_periods_s"): "contact T (s)",
