@@ -75,7 +75,7 @@ LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
     "last_step_period_s": "step_periods_s",
     "last_step_length_m": "step_lengths_m",
 }
-"""Headlines that are the last entry of a list: names of the lists by headline."""
+"""For each headline that is the last entry of a list, the name of that list."""
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:

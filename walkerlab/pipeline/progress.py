@@ -41,7 +41,7 @@ class Reporter(Protocol):
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
         """Begin a stage, possibly while others run.
 
-        place       number of the stage among those to run, and the reason for a rerun; '' for a single new stage
+        place       the stage's number among those to run and the reason for a rerun, or '' for a single new stage
         expected_s  last run time of the stage (s), if known
         """
 

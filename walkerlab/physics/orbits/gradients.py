@@ -22,7 +22,7 @@ from walkerlab.physics.orbits.step_map import Cycle, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 
 # Differentiable quantities with units. The norms describe how the step period responds to a floor drop. The scaled norm
-# is in the walker's pendulum times per leg length.
+# measures time in pendulum times and length in leg lengths of the walker.
 GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "period_s": "s",
     "step_length_m": "m",
@@ -32,7 +32,7 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # number of quantities, listed first, that follow from a single stride
+STEP_QUANTITY_COUNT = 3  # number of quantities at the start of this list, which follow from a single stride
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
@@ -75,7 +75,7 @@ def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIE
 
 
 def mean_quantities(stride: Cycle) -> tuple[float, float, float]:
-    """Return mean period (s) and length (m) of a stride's steps, and the speed (m/s)."""
+    """Return the mean period (s) and the mean length (m) of a stride's steps, and the speed (m/s)."""
     steps = len(stride.steps)
     period = stride.period_s
     length = math.fsum(stride.lengths_m)

@@ -88,5 +88,5 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
         corrections = corrections + 1
     if current.outcome is Outcome.WALKED:
         return Solution(x, current, corrections)
-    # If only a later move led to parameters without a valid walker, the guess itself is valid.
+    # If the parameters became invalid only in a later Newton move, the guess itself was valid.
     return NotConverged(Outcome.WALKED if current.outcome is None and corrections else current.outcome)

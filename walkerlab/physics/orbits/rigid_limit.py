@@ -28,7 +28,7 @@ METHOD = "radau5"
 LIMIT_BUDGET = 50_000_000
 GAIT_TOLERANCE = 1e-10
 CHECK_TOLERANCE = 1e-11
-# tolerances of timed walks, and of the walks that show their numerical error
+# tolerances of timed walks, and of the walks that measure their numerical error
 WALK_TOLERANCE = 1e-8
 WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
@@ -75,12 +75,13 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
     """Return the walker on the ground of a setting, with a shorter push-off if the series varies all parameters."""
-    # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
+    # A push-off that is not shortened lifts the leading foot again, however rigid the ground, and the series then tends
+    # to another limit.
     changed = scale_laws(walker, *setting[2:])
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass).depth
-    # The duration is inversely proportional to the square root of the stiffness, but at most the config's.
+    # The duration is inversely proportional to the square root of the stiffness, but never longer than the config's.
     brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness_factor))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 
@@ -98,8 +99,8 @@ class Distance:
     period_error_s: float  # difference from the rigid gait
     length_error_m: float  # difference from the rigid gait
     numerical_period_s: float  # change of the period when the tolerance is ten times tighter
-    angle_error_rad: float | None = None  # maximum difference between impacts, at equal phase
-    velocity_error_rad_s: float | None = None  # maximum difference between impacts, at equal phase
+    angle_error_rad: float | None = None  # maximum difference outside the impacts, at equal phase
+    velocity_error_rad_s: float | None = None  # maximum difference outside the impacts, at equal phase
     raw_angle_error_rad: float | None = None  # maximum difference at equal time
     raw_velocity_error_rad_s: float | None = None  # maximum difference at equal time
     # change of the last touchdown's time when the tolerance is a hundred times tighter

@@ -1,4 +1,4 @@
-"""Step map of the rigid model with its exact derivative, computed on the similar walker of unit size.
+"""Step map of the rigid model with its exact derivative, computed for the walker scaled to unit size.
 
 A gait's state lies on the section 'both feet on the slope, just after heel strike'. Its coordinates z are the stance
 leg's angle, which determines the swing leg's, and the rates of all bodies that turn independently: swing leg, stance
@@ -35,24 +35,26 @@ from walkerlab.physics.solvers.system import Floats, Integers, State
 
 WalkerAt = Callable[[float], RigidModel | None]
 STEP_WALKED = int(Outcome.WALKED)
-# The variational columns are linear and need fewer digits than the state. Scaled down by this, they keep about three
-# digits fewer (with an absolute tolerance of a tenth of the relative one), which halves the number of solver steps.
+# The variational columns are linear and need fewer digits than the state. Scaled down by this factor, they are
+# computed to about three digits fewer (with an absolute tolerance of a tenth of the relative one), which halves the
+# number of solver steps.
 TANGENT_SCALE = 2.0**-13
 EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # number of solver methods to keep, one for each number of tangent columns
-LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples are taken here, so that none falls after the heel strike
+# Samples later than this fraction of a step are taken at this fraction, so that none falls after the heel strike.
+LAST_SAMPLE = 1.0 - 1e-9
 # in sqrt(L/g). Standing still is also a fixed point, so any shorter step counts as standing still.
 SHORTEST_STEP = 0.05
-# Newton's method from random starts gives up after this many evaluations, and if a move is less than this fraction of a
+# Newton's method from random starts gives up after this many evaluations, or if a move is less than this fraction of a
 # full one.
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6
 NO_RESIDUAL = 1e300
 NEAR_RESIDUAL = 1e-6
-# A start within this distance of a known gait leads to that gait if a Newton move with the gait's derivative reduces
-# the distance to this fraction or less.
+# A search ends at a known gait once it is closer than RECOGNITION_DISTANCE to it and one Newton move with the gait's
+# derivative would reduce the distance to less than the fraction RECOGNITION_RESIDUAL.
 RECOGNITION_DISTANCE = 0.1
 RECOGNITION_RESIDUAL = 0.1
 # results of `solve_starts` other than the index of a known gait
@@ -70,7 +72,7 @@ class StrikeSection(NamedTuple):
     start: Any  # (2 n (1 + d),) the state at z = 0, with its variational columns
     basis: Any  # (d, 2 n)
     places: Any  # (d (1 + d),) indices of z in the state, then in each column
-    # the model if its legs differ in length or sole, because angles on the section are then not linear in z
+    # the model if its legs differ in length or sole, otherwise None: angles on the section are then linear in z
     curved: RigidModel | None
 
 
@@ -291,8 +293,8 @@ def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits,
 def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
     """Run Newton's method from z (d,), which is overwritten with the last point tried.
 
-    A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
-    The search stops if a known gait is close and one correction with its derivative would almost reach it.
+    A correction is halved until it reduces the residual. The search gives up on a start at rest or one that leads to no
+    heel strike. It stops if a known gait is close and one correction with its derivative would almost reach that gait.
     """
     method = memory.varied
     y = memory.y
@@ -405,7 +407,7 @@ class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
     section: StrikeSection
-    swings: tuple[LegSwing, ...]  # one for each leg that swings next; a single one for equal legs
+    swings: tuple[LegSwing, ...]  # one for each leg that can swing next, or a single one if the legs are equal
     # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
     feet: list[list[float]]
     radius: float

@@ -38,9 +38,10 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
     "largest_push_forward_N_s": ("hip-push", 1.0),
     "largest_push_backward_N_s": ("hip-push", -1.0),
 }
-"""For each largest survived disturbance, its kind and its sign."""
+"""Kind and sign of each largest survived disturbance."""
 INDICATORS = ("step_period", "step_length", "speed")
-# The responses of this many steps (a stride, if the legs differ) are difference quotients of exact walks.
+# For this many steps (a stride, if the legs differ), responses are difference quotients of simulated walks. Those of
+# later steps follow from the linearised stride.
 DIRECT_STEPS = 2
 # offsets and weights of fourth-order formulas for a first derivative, the most accurate first
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
@@ -53,7 +54,7 @@ MAX_DISTURBANCE = 0.5  # largest disturbance tried, as a multiple of `unit_of`
 
 
 class GaitOnMap(NamedTuple):
-    """A gait of one stride on its step map, where a stride is a single step for equal legs."""
+    """A gait that repeats after one stride, with its step map. If the legs are equal, a stride is a single step."""
 
     step_map: StepMap
     p: float  # value of the parameter
@@ -72,14 +73,14 @@ class GaitOnMap(NamedTuple):
         return walk_steps(self.step_map, z, p, self.step_map.stride, derived, self.swing)
 
     def split_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait from the start of each step of its stride, in the order of `leg`.
+        """Return the gait once for each step of its stride, beginning with that step, sorted by `leg`.
 
         For equal legs, a stride is a single step.
         """
         if self.step_map.stride == 1:
             return [self]
         first, second = (step for step in self.stride(self.z, self.p).steps)
-        # From the other section, the second step comes first.
+        # If the gait starts from the next section, its second step comes first.
         other = self._replace(z=first.z, A=first.DP @ second.DP, swing=self.swing + 1)
         return sorted((self, other), key=lambda gait: gait.leg)
 
@@ -186,7 +187,7 @@ def largest_survived(stands: Callable[[float], bool], unit: float, width: float 
 def largest_disturbance(
     gait: GaitOnMap, disturbance: Disturbance, sign: float, steps: int, width: float = BISECTION_WIDTH
 ) -> float:
-    """Return the largest disturbance of one sign after which a walk takes `steps` steps.
+    """Return the largest disturbance of the given sign after which a walk still takes `steps` steps.
 
     width  accuracy, as a multiple of `unit_of`
     """
@@ -198,7 +199,7 @@ def largest_disturbance(
 
 
 def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], max_steps: int) -> int:
-    """Count the steps of a walk from the gait over normally distributed heights, stopping at `max_steps` steps."""
+    """Count the steps, up to `max_steps`, of a walk that starts on the gait, over normally distributed heights."""
     heights = rough_heights(roughness_m, seed, max_steps)
     return int(gait.step_map.take_disturbed_walk(gait.z, gait.p, heights, swing=gait.swing).durations_s.size)
 

@@ -28,11 +28,12 @@ from walkerlab.physics.solvers.system import Floats, Integers, State
 START_TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
 RIGID_TOLERANCES = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
 SETTLED_SHARE = 0.02  # largest deviation from the gait, as a fraction of its period and step length
-MARGIN_STEP = 0.02  # spacing of factors until a walk fails
+MARGIN_STEP = 0.02  # spacing of the factors that are tried in turn until a walk fails
 SMALLEST_FACTOR = 0.0
 LARGEST_FACTOR = 4.0
 MARGIN_HALVINGS = 14
-ZOOMS, ZOOM_CELLS = 4, 4  # number of successively finer grids around the best start, and of cells on each side of it
+# number of successively finer grids around the best start, and number of cells of each grid on each side of it
+ZOOMS, ZOOM_CELLS = 4, 4
 ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
@@ -131,7 +132,7 @@ def margins(
     step: float = MARGIN_STEP,
     largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
-    """Find how far the velocities of a start may be scaled, alone and together, until it no longer leads to walking.
+    """Find how far the velocities of a start may be scaled, separately and together, before the walker no longer walks.
 
     around   factors for the velocities of swing and stance leg that lead to walking
     largest  largest factor tried
@@ -192,7 +193,7 @@ def smallest_change(
             distance = np.hypot(*(grid - 1.0).T)
             nearer = np.flatnonzero(distance < math.hypot(best[0] - 1.0, best[1] - 1.0) - 1e-12)
             nearest_first = grid[nearer[np.argsort(distance[nearer], kind="stable")]].tolist()
-            # Points are evaluated one at a time, the cheap walk first, because most points need no more.
+            # Evaluate one point at a time, with the cheap walk first, because it already rules out most points.
             both = ((a, b) for a, b in nearest_first if quick.walk(a, b).walks and starts.walk(a, b).walks)
             best = next(both, best)
         return Adjustment(*best, starts.walk(*best))

@@ -32,10 +32,10 @@ LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding e
 # rad, angle between the legs at which the long-period seed is accurate to a percent
 LONG_AMPLITUDE = 0.05
 SHORT_AMPLITUDE = 0.002
-# largest exponent of growth while falling for half a step. Above it, rounding errors hide the start.
+# largest growth exponent of the falling mode over half a step. Above it, the start is lost in rounding errors.
 MAX_GROWTH = 30.0
-# matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
-# state into theta_1 + theta_2
+# matrices for a slope of 1 rad: STATE_OF maps (z, 1) to the state, SECTION_ROWS maps (z, 1) to z, and FEET_DOWN maps
+# the state to theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 SECTION_ROWS = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
@@ -165,7 +165,8 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """Return the gait proportional to the slope, with a period below `longest` (s), or None if it does not exist."""
+    """Return the gait whose angles are proportional to the slope and whose period is below `longest` (s), or None if it
+    does not exist."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -187,7 +188,8 @@ def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> Small
 
 
 def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floats]:
-    """Return the linearised conditions on a step on a slope of one radian: matrices (..., 4, 4) for durations t (s)."""
+    """Return a function that maps durations t (s) to matrices (..., 4, 4) of the linearised conditions for a step, at a
+    slope of one radian."""
     # The matrices act on (z, 1). Three rows require that z repeats after t, one that both feet are down. A solution
     # exists if the determinant vanishes.
     flat = rigid.change_slope(walker, 0.0)

@@ -30,7 +30,7 @@ identity = lru_cache(np.eye)  # The matrices are shared, so never write to them.
 no_values = partial(np.zeros, 0)
 NO_TIMES = np.zeros(0)
 VARIATION = 1e-6  # difference step of section coordinates, and of heights (m)
-INSTANT_S = 1e-6  # s, difference step for the rates of samples
+INSTANT_S = 1e-6  # s, time step of the finite differences that give the rates of samples
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Stepper(Protocol):
 class StepMap(Stepper, Protocol):
     """Step of a walker from section to section, with the derivatives and limits that continuation needs."""
 
-    # all coordinates of the section are of magnitude one
+    # all coordinates of the section are of order one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures
     scale: float  # size of a typical change of the parameter
     tolerances: Tolerances  # solver settings of a step
@@ -115,7 +115,7 @@ class StepMap(Stepper, Protocol):
     ) -> DisturbedWalk:
         """Walk from z (d,) over uneven ground, after a push at the hip along the slope.
 
-        heights_m  (steps + 1,) heights of the footholds, beginning with the present one
+        heights_m  (steps + 1,) heights of the footholds, starting with the current one
         swing      as in `Stepper.step`
         """
 
@@ -160,7 +160,7 @@ class StepMap(Stepper, Protocol):
         return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Return work divided by weight times distance for a stride from z (d,), or None if a step fails."""
+        """Return the work of a stride from z (d,) divided by (weight times distance), or None if a step fails."""
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
@@ -195,13 +195,13 @@ class StepMap(Stepper, Protocol):
 
 def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: int = 0) -> tuple[Outcome | None, Floats]:
     """Return the outcome of steps from z (d,) at values near p, and the derivative (d,) of a step with respect to p."""
-    # This second-order difference only steers predictors and Newton's method and enters no result.
+    # Only predictors and Newton's method use this second-order difference, so it does not affect any result.
     # Near zero, h is relative to p, because a parameter such as a mass must not become negative.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, False, swing) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
-        # If a value gives no valid walker or start, the next formula uses values on another side.
+        # If a value gives no valid walker or start, try the next formula, which is one-sided.
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
@@ -213,7 +213,7 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate step quantities (steps,) and samples (times, 2) of a disturbed walk in one direction.
+    """Return the directional derivatives of step quantities (steps,) and samples (times, 2) of a disturbed walk.
 
     along  (d + steps + 1,) changes of z and of the heights (m)
 
@@ -317,7 +317,7 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int, derived: bool = T
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """Return the cycle with its derivative `Dp`. If a step fails at a nearby value, return it with that outcome."""
+    """Return the cycle with its derivative `Dp`, or with the outcome of a step that fails at a nearby value."""
     position = cycle.z
     Dp = 0.0 * cycle.z
     for swing, step in enumerate(cycle.steps):

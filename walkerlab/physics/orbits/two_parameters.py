@@ -1,4 +1,4 @@
-"""Gaits over two parameters: curves of folds and flips, and the periods of attractors cell by cell.
+"""Gaits as functions of two parameters: curves of folds and flips, and the attractor's period in each grid cell.
 
 A bifurcation is a gait at which a test function vanishes: P^n(z) = z and det(DP -+ 1) = 0, one more equation than for a
 gait, with the second parameter as one more unknown. The curve is continued by arclength like a branch.
@@ -38,7 +38,8 @@ CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # accuracy of a cell's gait
 UNSTABLE_OFFSET = 1e-3
 
 
-# Step map over the first parameter as a function of the second; None if there is no valid walker.
+# Returns the step map, a function of the first parameter, at a value of the second, or None if there is no valid
+# walker.
 MapAt = Callable[[float], StepMap | None]
 
 

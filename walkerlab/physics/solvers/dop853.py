@@ -18,13 +18,13 @@ from walkerlab.physics.solvers.system import Floats, State, block, derivative
 # With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
 # more work.
 SAFETY = 0.8
-# Limits of the change of a step, as in Hairer's dop853.f.
+# Limits on the ratio of successive step sizes, as in Hairer's dop853.f.
 SHRINK_MOST = 0.333
 GROW_MOST = 6.0
 EXPONENT = 1.0 / 8.0
 STAGE_COUNT = 12
 EXTRA_STAGES = 3
-# row of the derivative at the step's end; number of rows with dense output
+# LAST_STAGE is the row of the derivative at the step's end, and ALL_STAGES the number of rows with dense output.
 LAST_STAGE = STAGE_COUNT
 ALL_STAGES = STAGE_COUNT + 1 + EXTRA_STAGES
 
@@ -183,7 +183,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     limit = GROW_MOST
     outcome = stepping.OUT_OF_BUDGET
     while counts[stepping.RHS] < counts[stepping.BUDGET]:
-        # Stretch a step that nearly reaches the end, because a tiny one would have to follow.
+        # Stretch a step that nearly reaches the end, to avoid a tiny last step.
         last = t + 1.01 * h >= t_end
         if last:
             h = t_end - t
@@ -260,7 +260,7 @@ LANE_ERROR_3 = tableau.nonzero(tableau.ERROR_3)
 @kernel_part
 def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
-    # The stages are written out, because compiled code has a type for each length of a tuple: no loop can extend them.
+    # The stages are written out, because in compiled code a tuple's type includes its length, so no loop can extend it.
     k2 = lanes.derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, WEIGHTS[1], (k1,)))
     k3 = lanes.derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, WEIGHTS[2], (k1, k2)))
     k4 = lanes.derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, WEIGHTS[3], (k1, k3)))

@@ -82,7 +82,7 @@ def first_crossing(finder: CrossingFinder, event: int, direction: int, after: fl
     """Find the fraction of the step, above `after`, at which an event function first changes sign, or NO_CROSSING.
 
     direction      FALLING, RISING, or 0 for either
-    zero_at_start  whether the event function is zero at the start of the step, where it then counts as no crossing
+    zero_at_start  whether the event function is zero at the start of the step; that zero is not counted as a crossing
     """
     if not spans_zero(finder, event):
         return NO_CROSSING
@@ -99,7 +99,7 @@ def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: 
     while top >= 0:
         low, high = ends[top, 0], ends[top, 1]
         signs = sign_changes(stack, top, size)
-        # Coefficients of one sign: the polynomial lies in their hull, so it has no zero here.
+        # If all coefficients have the same sign, the polynomial has no zero here, because it lies in their convex hull.
         if high <= after or signs == 0:
             top -= 1
             continue
@@ -136,8 +136,8 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
     for i in range(1, finder.nodes.size):
         smallest = min(smallest, finder.values[event, i])
         largest = max(largest, finder.values[event, i])
-    # Between the nodes, a polynomial exceeds the range of its values by less than that range: Lebesgue's constant of
-    # these points is below 3 up to degree 12. The factor 8 leaves a wide margin.
+    # Between the nodes, a polynomial leaves the range of its values at the nodes by less than the width of that range,
+    # because the Lebesgue constant of these points is below 3 up to degree 12. The factor 8 leaves a wide margin.
     room = 8.0 * (largest - smallest)
     return smallest <= room and largest >= -room
 
@@ -168,11 +168,11 @@ def divide_out_zero(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Return the slope (per step) with which an event function leaves its zero at the start.
+    """Return the slope (per step) with which an event function that is zero at the start leaves zero.
 
     Returns 0 if no slope is larger than `clearly`.
     """
-    # The error of the last event's time leaves a small value at the start, which is subtracted.
+    # The last event's time is inexact, so the event function is not exactly zero at the start. Subtract that offset.
     size = set_root_piece(finder, event, False)
     for i in range(1, size):
         slope = (finder.stack[0, i] - finder.stack[0, 0]) * (size - 1) / i
@@ -221,8 +221,8 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
         elif (value_c < 0.0) == (value_b < 0.0):
             b = c
             value_b = value_c
-            # Illinois: an end that stays twice gets half its value, since plain regula falsi would approach it ever
-            # more slowly.
+            # Illinois: if the same end is kept twice in a row, halve its value, because plain regula falsi would
+            # converge ever more slowly.
             value_a = 0.5 * value_a if side == -1 else value_a
             side = -1
         else:
@@ -302,7 +302,7 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
         changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)
     if changes == 0:
         return NO_CROSSING
-    # `only_crossing` starts from the end of the step and knows neither `after` nor a zero at the start.
+    # `only_crossing` starts from the end of the step and handles neither `after` nor a zero at the start.
     if changes == 1 and not zero_at_start and after == 0.0:
         return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
     for i in range(6):
@@ -324,8 +324,8 @@ def only_crossing(quintic: Quintic) -> float:
             high = x
         else:
             low = x
-        # Where the quintic does not fall, Newton would leave the bracket. `low` is not inside it either, so bisection
-        # follows.
+        # Where the quintic does not fall, Newton's method would leave the bracket. Setting `new` to `low` fails the
+        # test below, which then bisects.
         new = x - value / slope if slope < 0.0 else low
         if not low < new < high:
             new = 0.5 * (low + high)

@@ -203,7 +203,7 @@ def load(context: Any, array: Any, row: Any) -> Any:
     """Load row `row` of a contiguous array (rows, WIDTH)."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        # NumPy guarantees only the alignment of a double, so a load with that of a vector could crash.
+        # NumPy guarantees only the alignment of a double, so a load that assumes a vector's alignment could crash.
         return builder.load(_row_pointer(context, builder, sig.args[0], *arguments), align=8)
 
     return LANES(array, types.intp), generate

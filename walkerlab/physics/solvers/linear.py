@@ -12,7 +12,10 @@ def reciprocal(x: Any) -> Any:
 
 
 def complex_reciprocal(x: Any) -> Any:
-    """Compute 1 / x by Smith's formulas, equal to Python's to the last bit. Numba's division is a function call."""
+    """Compute 1 / x by Smith's formulas. The result equals Python's to the last bit.
+
+    Numba's own division would be a function call.
+    """
     if abs(x.real) >= abs(x.imag):
         ratio = x.imag / x.real
         whole = x.real + x.imag * ratio
@@ -27,7 +30,7 @@ compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Comp
 
 @kernel_part
 def size(x: Any) -> float:
-    """Compute |Re x| + |Im x|, a magnitude for choosing pivots that needs no square root."""
+    """Compute |Re x| + |Im x|, which is enough to choose pivots and needs no square root."""
     return abs(x.real) + abs(x.imag)
 
 

@@ -250,7 +250,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 
 @stepping.begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
-    """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
+    """Evaluate the derivative and the Jacobian at the start, and discard the history of the step-size control."""
     clock = method.clock
     control = method.control
     clock[stepping.T_OLD], clock[stepping.T], clock[stepping.H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP

@@ -19,7 +19,7 @@ class Method:
     new: Callable[[int, float, float, int], Any]
     stiff: bool  # whether the method suits stiff problems
     orders: tuple[int, int]  # minimum and maximum order, which are equal unless the method varies its order
-    compiled: bool = False  # whether whole walks are compiled. Those with a method of another library run in Python
+    compiled: bool = False  # whether whole walks are compiled. With another library's method they run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
@@ -73,7 +73,8 @@ def method_named(name: str) -> Method:
 
 
 ENDLESS = 2**62
-"""Budget that is never exhausted, for walks that limit right-hand sides per step rather than per walk."""
+"""Budget that is never exhausted, for walks that limit the right-hand-side evaluations per step rather than per
+walk."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class Tolerances:
     rtol: float
     atol: float
     budget: int  # right-hand sides per walk
-    # whether to check the energy balance of a contact walk, which comparisons of methods do not need
+    # whether to check the energy balance of a contact walk. Comparisons of methods do not need this check
     track_energy: bool = True
 
     @property
@@ -97,7 +98,8 @@ class Tolerances:
 
 
 def share_counts(method: Any, clock: Any, counts: Any) -> Any:
-    """Return the method with the clock and counts of another method, so that both integrate the same walk in turn."""
+    """Return the method with the clock and counts of another method, so that they can take turns
+    integrating the same walk."""
     if isinstance(method, ScipyMethod):
         method.clock = clock
         method.counts = counts

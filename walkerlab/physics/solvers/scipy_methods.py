@@ -1,6 +1,7 @@
 """Integrators of SciPy and SUNDIALS with the interface of `stepping`, for comparison and as a check.
 
-The right-hand side is compiled, but the walk itself runs in Python, from the same source.
+The right-hand side is compiled, but the walk itself runs in Python, from the source that is compiled for the
+built-in methods.
 """
 
 from collections.abc import Callable
@@ -58,7 +59,10 @@ class ScipyMethod:
 
 
 def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """Return the compiled right-hand side as libraries call it. It counts calls and raises OutOfBudgetError."""
+    """Return the compiled right-hand side in the form that libraries call.
+
+    It counts calls and raises OutOfBudgetError.
+    """
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
 

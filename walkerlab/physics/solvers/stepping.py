@@ -32,7 +32,7 @@ def begin(method: Any, system: Any, t: float, y: Any, h: float) -> None:
 
 @dispatch_by_type
 def advance(method: Any, system: Any, t_end: float) -> int:
-    """Take one accepted step, not beyond t_end (s), and keep the previous state in `y_old`. Return a status."""
+    """Take one accepted step up to t_end (s) at most, keep the previous state in `y_old`, and return a status."""
 
 
 @dispatch_by_type
@@ -42,7 +42,10 @@ def rewind(method: Any, system: Any) -> None:
 
 @dispatch_by_type_or_default
 def prepare_dense(method: Any, system: Any) -> None:
-    """Prepare the dense output of the last step for `interpolate`. Most methods need no case: a step stores it."""
+    """Prepare the dense output of the last step for `interpolate`.
+
+    Most methods do not implement this, because their steps already store the dense output.
+    """
 
 
 @dispatch_by_type

@@ -19,7 +19,10 @@ State = tuple[float, ...]
 
 @dispatch_by_type
 def block(system: Any) -> Any:
-    """Return a value whose length is the block size of loops over the state: fixed at compile time, a divisor of n."""
+    """Return a value whose length is the block size of loops over the state.
+
+    The length is fixed at compile time and divides n.
+    """
 
 
 @dispatch_by_type

@@ -1,5 +1,7 @@
-"""Graphs of stages, and the pipeline, which has the stages of all extensions: drawings come late, and the report
-last."""
+"""Graphs of stages, and the pipeline, which is the graph of all stages, including those of extensions.
+
+Drawings come near the end, and the report comes last.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,7 +35,7 @@ class Graph:
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
         """Pickle only the import path, because stages hold functions that cannot be pickled."""
         if not self.at:
-            raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
+            raise TypeError("a graph without `at`, its import path, cannot be sent to other processes")
         return load, (self.at,)
 
     def __getitem__(self, name: str) -> Stage:
@@ -59,7 +61,7 @@ class Graph:
         stages = self.needed_for(target, config)
         for stage in stages:
             if stage.draws:
-                raise ConfigError(f"{stage.name} only draws files into a run folder; it has no result in memory.")
+                raise ConfigError(f"{stage.name} only writes files to a run folder and has no result in memory.")
             stage.refuse_unsuited(target, config)
         return stages
 
@@ -71,12 +73,12 @@ class Graph:
 by_name: dict[str, Stage] = {}
 for extension in extensions().values():
     for stage in extension.stages:
-        by_name.setdefault(stage.name, stage)  # equal names are reported by `check_names`
+        by_name.setdefault(stage.name, stage)  # `check_names` reports duplicate names
 STAGES = tuple(by_name.values())
 
 
 def complete(drawing: Stage) -> Stage:
-    """Add to the inputs of a drawing the stages that name the drawing in `needed_by` or `shown_by`.
+    """Add the stages that name a drawing in `needed_by` or `shown_by` to the drawing's inputs.
 
     A stage with the same name as a config block is needed only by configs with that block.
     """

@@ -97,7 +97,7 @@ class Planner:
 
     def _judge(self, stage: Stage, force: bool) -> Step:
         reason = stage.why_unsuited(self.config)
-        # A drawing lacks nothing: it shows the results that exist, and says which are missing.
+        # A drawing needs no particular result: it shows those that exist, and says which are missing.
         for name in () if stage.draws else stage.inputs(self.config):
             if reason is None and name in self.left_out:
                 reason = f"it needs {name}: {self.left_out[name]}"

@@ -23,7 +23,7 @@ class ResolvedRun:
 
     loaded: loader.LoadedConfig
     folder: RunFolder
-    extends: str  # file or built-in name of the config that new configs with results of this run extend
+    extends: str  # file or built-in name in the `extends` of new configs with results of this run
 
 
 def resolve(
@@ -84,7 +84,7 @@ def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str
     except ConfigError:
         return file.label, ["it is no longer valid"]
     changed_keys = {loader.key_of(change) for change in folder.changes}
-    # A setting of slope_deg changes slope_rad, and any setting may change angles of the start.
+    # Setting slope_deg changes slope_rad, and setting any key may change angles of the start.
     changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
     before, after = (dict(reads.flatten(dump)) for dump in dumps)
@@ -96,8 +96,8 @@ def edits_since(config: schema.Config, folder: RunFolder) -> tuple[str, list[str
 
 
 def warn_of_edits(config: schema.Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
-    """Warn if the config file of a run was edited after the run. `config` is the run's, or None if that is
-    unreadable."""
+    """Warn if the config file of a run was edited after the run. `config` is the config of the run, or None
+    if it cannot be read."""
     if config is None:
         return
     file, edits = edits_since(config, folder)

@@ -46,7 +46,7 @@ class Keys:
         """Return the identity of a stage's result under a config.
 
         input_keys  keys of the inputs, by stage
-        again       as for `call_stage`; always true for results in folders
+        again       see `call_stage`; always true for results in folders
         """
         once = {} if again else {"again": False}
         dependencies = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
@@ -117,7 +117,7 @@ class FolderResults:
         self._begun: dict[str, tuple[Provenance, files.Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
-        """Return a step that reuses a stage's result or runs the stage. With `force` it always runs the stage."""
+        """Decide whether to reuse a stage's result or to run the stage. With `force` the stage always runs."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
         stored = verdict.artifact
@@ -147,9 +147,9 @@ class FolderResults:
                     shutil.copyfile(step.origin, temporary)
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
-        """Prepare to store a result, and return the optional arguments of the stage, see `call_stage`.
+        """Prepare to store a result, and return the stage's optional arguments (see `call_stage`).
 
-        With `force`, the checkpoint of an interrupted run is dropped.
+        With `force`, drop the checkpoint of an interrupted run.
         """
         stage = step.stage
         identity = step.identity

@@ -24,7 +24,7 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
 ]
-"""Ways to read the value of an option, which docs/adding.md lists."""
+"""Ways to read an option's value, as listed in docs/adding.md."""
 
 
 def message_without_block(name: str) -> str:
@@ -66,7 +66,7 @@ def walks_and(*names: str) -> Inputs:
 
 @dataclass(frozen=True)
 class Option:
-    """Option of a stage's command, which sets a key of the config."""
+    """Command-line option of a stage. It sets a config key or selects another stage."""
 
     flag: str  # as typed, such as --steps
     key: str  # dotted config key
@@ -81,14 +81,14 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return options for what a recording does not say about itself. They set keys of `block` and need the flags
-    `needs`."""
+    """Return options for what a recording does not state. They set keys of `block` and can be used only together with
+    the flags `needs`."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units of columns, where the file does not state them.", "units"),
         Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
         Option(
-            "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line from which angles are measured."
+            "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Tilt of the line from which angles are measured."
         ),
         Option("--belt-speed", "belt_speed_m_s", "M/S", "Speed of a treadmill's belt.", "float"),
         Option("--fps", "fps", "N", "Frames per second of the film.", "float"),
@@ -105,7 +105,7 @@ def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
 class Stage:
     """One stage of the pipeline."""
 
-    name: str  # name of the stage, its command and its artifact
+    name: str  # name shared by the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
     # Type of the slice of the config that `run` takes and on which the result depends, or a function that returns this
@@ -118,7 +118,7 @@ class Stage:
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
     # "times": it measures run times, so it must run alone. "draws": it also writes files, from the results that exist.
     work: Literal["computes", "times", "draws"] = "computes"
-    # The only command that runs the stage: its own or `STAGE --full`. Empty if stages that need this one run it, too.
+    # The only command that runs the stage: its own or `STAGE --full`. Empty if it also runs for stages that need it.
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # stages whose results suffice for a partial drawing while others still run
@@ -150,7 +150,7 @@ class Stage:
         return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: "Config") -> str | None:
-        """Return the reason why the stage has no result for a config's unequal legs, or None if it has one."""
+        """Return the reason why the stage does not support a config's unequal legs, or None if it does."""
         if not self.needs_equal_legs:
             return None
         # Imported here to keep the help of the command line fast. Equal legs need no mechanics.
@@ -180,7 +180,7 @@ class Stage:
             raise contact_required_error(target, config.walker, advice)
 
     def refuse_question(self, config: "Config") -> None:
-        """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
+        """Raise ConfigError if the stage is on demand and the `refuse` function of its module rejects the config."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
             refuse(reads.restrict(config, self.takes_under(config)))

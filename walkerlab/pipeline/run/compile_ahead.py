@@ -19,7 +19,7 @@ from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 COMPILING_BUDGET = 200  # right-hand sides, enough for the first step of each method
-# One method for each form of the kernels: our two methods, and one of another library, which calls them from Python.
+# One method for each form of the kernels: our two, and one from a library that calls the kernels from Python.
 COMPILED_METHODS = ("radau5", "dop853", "scipy-radau")
 
 

@@ -234,10 +234,9 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Make the drawings for which the results so far suffice. `why` is the reason why `unsettled` stages have no
-        results.
+        """Make every drawing that the results so far allow. `why` says why the `unsettled` stages have no results.
 
-        Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
+        Only the last drawing, the page, is redrawn after each stage, because it also shows what the others have drawn.
         """
         planner = self.planner
         folder = self.planner.results.folder

@@ -88,7 +88,7 @@ def execute(
 
     Raises ConfigError if the config lacks a block that the target requires or the folder holds results of another
     config, LockedError if another process works in the folder and `options.wait` is false, and StorageError. A stage
-    without an answer raises nothing, see `StageReport.no_answer`.
+    without an answer raises nothing (see `StageReport.no_answer`).
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)

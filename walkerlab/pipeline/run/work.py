@@ -22,7 +22,8 @@ takes."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
-"""A batch is at most 1/SHARES of the remaining work per worker (or MIN_BATCH_S), so that all workers end together."""
+"""A batch is at most 1/SHARES of the remaining work per worker (or MIN_BATCH_S), so that all workers finish at about
+the same time."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
 """Errors that indicate a bug. They are not retried, because a retry would only repeat them."""
 MAX_DEATHS: Final = 12
@@ -39,7 +40,7 @@ class WorkUnit(NamedTuple):
     """Piece of work that is computed as a whole. Its result is stored under `name`."""
 
     name: str
-    size: int  # number of parts that the unit adds to the progress
+    size: int  # number of parts that the unit counts for in the progress
     run: Callable[[], Any]  # function that computes the result; any process can call it
 
 
@@ -148,7 +149,10 @@ class Spread:
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Retry a failed batch, then its halves, and give up on a unit that keeps failing. Bugs are raised again."""
+        """Retry a failed batch, then its halves, and give up on a unit that keeps failing.
+
+        Errors that would only repeat, such as bugs, are re-raised.
+        """
         of_worker = isinstance(error, WorkerDiedError | JobEndedError)
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not of_worker):
             raise error
@@ -178,7 +182,7 @@ def complete(
     shared_from: int = 0,
     compiled: bool = False,
 ) -> tuple[list[Numbers], int]:
-    """Compute the units that the checkpoint lacks, and store the result of each in it.
+    """Compute the units that the checkpoint lacks, and add their results to it.
 
     checkpoint   units that an earlier run computed
     jobs         maximum number of processes

@@ -83,7 +83,7 @@ def end_with_parent() -> None:
 
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 WORKER_PATIENCE_S = 5.0
-"""Time that a worker has to end before it is killed."""
+"""How long a worker may take to end before it is killed."""
 # A terminal interrupts workers as well, but only the parent reacts.
 START = """
 import signal, sys
@@ -226,7 +226,7 @@ class SizedExecutor(Executor):
 
 
 class WorkerPool(SizedExecutor):
-    """Executor that starts workers as needed, replaces those that died and ends all when it is shut down."""
+    """Executor that starts workers as needed, replaces those that died and ends all of them when it is shut down."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
         """Set up at most `size` workers without starting one. `modules` and `environment` are as in `Worker`."""
@@ -337,7 +337,8 @@ def serve(number: int, modules: Sequence[str]) -> None:
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
-    # The call has been abandoned. The terminal and the parent may both send a signal, so a second one ends the process.
+    # The call has been abandoned. The terminal and the parent may each send a signal. From now on, another one simply
+    # ends the process.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
