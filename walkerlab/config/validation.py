@@ -156,7 +156,7 @@ def following_values(config: schema.Config, stated: Sequence[float | None]) -> d
 
 
 def check_bodies(config: schema.Config, tree: BlockNode) -> None:
-    """Raise ConfigError with positions for parts on unknown bodies or feet on the wrong leg."""
+    """Raise ConfigError, with the position in the file, if a part is on an unknown body or a foot on the wrong leg."""
     walker = config.walker
     if not isinstance(walker, walkers.AssembledWalker):
         return

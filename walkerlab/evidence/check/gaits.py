@@ -174,7 +174,7 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
 
 
 def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
-    """Return the convention, with the sign of a relative angle chosen so that both printed feet are on the slope.
+    """Return the convention, with the sign of a relative angle that puts both feet of the printed state on the slope.
 
     Return it unchanged if the angle is not relative, or if neither sign puts them there.
     """
