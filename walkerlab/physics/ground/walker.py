@@ -207,7 +207,7 @@ def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
 
 @kernel_part
 def root_position(form: GroundModel, y: Any) -> tuple[float, float]:
-    """Return the position of the root along the slope and above it (m). The hinge of a pinned form is at 0."""
+    """Return the position of the root along the slope and above it (m). Along the slope, a pinned hinge is at 0."""
     return (y[0], y[1]) if form.places > 0 else (0.0, form.root_height)
 
 
