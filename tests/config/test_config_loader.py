@@ -369,7 +369,7 @@ def test_method_of_an_uninstalled_package_names_that_package(refused: Refused, m
     assert message.endswith("pip install scikit-sundae")
 
 
-def test_changing_the_inherited_type_lists_missing_keys(refused: Refused) -> None:
+def test_changing_the_inherited_type_lists_keys_that_the_new_type_lacks(refused: Refused) -> None:
     message = refused("extends: paper\n", ["walker.type=kneed"])
     assert message.startswith("--set walker.type=kneed: walker.type: kneed has no leg_length_m, foot_to_mass_m, ")
     assert "(of type compass), given at built-in paper.yaml:" in message

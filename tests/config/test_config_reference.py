@@ -30,7 +30,7 @@ def test_key_shared_by_all_walker_types_is_listed_once() -> None:
     assert [row.key for row in select_keys("walker(kneed).hip.torque_N_m")] == ["walker(kneed).hip.torque_N_m"]
 
 
-def test_keys_that_contain_the_word_are_suggested() -> None:
+def test_unknown_key_suggests_keys_that_contain_it() -> None:
     with pytest.raises(ConfigError) as error:
         select_keys("mass")
     suggested = re.findall(r"walker[.a-z_]+mass_kg", error.value.message)

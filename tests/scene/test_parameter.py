@@ -61,7 +61,7 @@ def test_parameters_are_exactly_the_numeric_keys_of_the_walker(config):
             assert caught.value.advice
 
 
-def test_models_can_be_built_at_a_nearby_value(config):
+def test_every_parameter_can_be_changed_by_a_thousandth(config):
     for key in (*numbers_of(config), "slope_deg"):
         parameter = parameter_of(key, config)
         value = parameter.value_in(config)

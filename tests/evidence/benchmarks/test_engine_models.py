@@ -231,7 +231,7 @@ def test_walker_with_a_low_hip_has_fallen(scene):
     assert rules.outcome is Outcome.FELL
 
 
-def test_touch_time_between_two_solver_steps_comes_from_a_cubic():
+def test_touch_time_is_interpolated_by_a_cubic_between_solver_steps():
     h, touch = 0.1, 0.037
 
     def height(t):

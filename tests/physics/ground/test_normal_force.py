@@ -113,7 +113,7 @@ def test_force_starts_at_zero_at_first_touch(rate):
     assert forces[-1] < 1e-4 * law.damping * abs(rate)
 
 
-def test_normal_law_is_consistent_in_its_units():
+def test_normal_force_is_the_same_in_adams_and_si_units():
     """Compare the law in N/mm^e and mm with the law in N/m^e and m."""
     k, e, c, d_max = 1e5, 2.2, 90.0, 0.1
     law = Impact(k * 1000.0**e, e, c * 1000.0, d_max / 1000.0)

@@ -171,7 +171,7 @@ def test_hinge_to_a_missing_body_is_rejected():
         Assembly((Body("leg", 1.0, (0.0, 0.0)),), (Revolute("hip", "leg", (0.0, 0.0), "torsoo", (0.0, 0.0)),))
 
 
-def test_bodies_of_equal_name_are_rejected():
+def test_bodies_with_the_same_name_are_rejected():
     with pytest.raises(ValueError, match="duplicate body name"):
         Assembly((Body("leg", 1.0, (0.0, 0.0)), Body("leg", 2.0, (0.0, 0.0))), joints=())
 

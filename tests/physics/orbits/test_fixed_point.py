@@ -171,7 +171,7 @@ def test_following_a_seed_costs_at_most_thirty_steps():
 
 
 @pytest.mark.parametrize("degrees", [0.0, -1.0, -40.0])
-def test_there_is_no_gait_without_descending_slope(degrees):
+def test_there_is_no_gait_without_a_downhill_slope(degrees):
     search = find_gaits(on_slope(degrees))
     assert search.gait is None
     assert "standing still is no gait" in search.reason

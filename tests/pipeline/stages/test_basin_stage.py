@@ -185,7 +185,7 @@ def test_invalid_basin_block_is_rejected(setting, said):
         load(None, [setting])
 
 
-def test_no_stage_needs_the_basin_and_drawings_use_it_if_current():
+def test_basin_is_never_required_but_is_drawn_if_current():
     assert PIPELINE["basin"].only_by == "basin"
     assert all("basin" not in stage.inputs(load(None, ()).config) for stage in PIPELINE.stages)
     assert "basin" in PIPELINE["plot"].if_current

@@ -474,7 +474,7 @@ class Counting(Silent):
         self.phases[-1][2] += n
 
 
-def test_each_fit_lists_its_rounds(table, gait):
+def test_progress_of_a_fit_names_model_and_start(table, gait):
     progress = Counting()
     identify.run(taken(*ask(table, "identify.fit={slope_deg: null}", "identify.starts=2")), gait, progress)
     assert [label for label, _, _ in progress.phases] == ["rigid model, start 1 of 2", "rigid model, start 2 of 2"]

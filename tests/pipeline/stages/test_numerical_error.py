@@ -33,7 +33,7 @@ def walk(stage, *sets, **options):
 @pytest.mark.parametrize(
     ("stage", "model", "keys"), [("simulate", "rigid", KEYS), ("contact-sim", "contact", KEYS | OF_FEET)]
 )
-def test_error_estimate_agrees_with_a_far_tighter_walk(stage, model, keys):
+def test_error_estimate_agrees_with_a_walk_at_much_tighter_tolerances(stage, model, keys):
     loose = walk(stage, f"solver.{model}.rtol=1e-4", f"solver.{model}.atol=1e-6", "outputs=[]", "strides=2")
     right = walk(stage, f"solver.{model}.rtol=1e-10", f"solver.{model}.atol=1e-12", "outputs=[]", "strides=2")
     error = loose["numerical_error"]

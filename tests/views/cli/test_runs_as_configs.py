@@ -87,7 +87,7 @@ def test_results_of_another_file_are_not_overwritten(toy, command):
     assert toy(*command, "-c", "there/stone.yaml", "--name", "other").returncode == 0
 
 
-def test_file_does_not_overwrite_the_run_of_a_built_in_config_of_equal_name(toy):
+def test_config_file_does_not_overwrite_the_run_of_a_built_in_config_with_the_same_name(toy):
     toy("drop")
     config(toy, "paper.yaml", 2, name="paper")
     assert toy("drop", "-c", "paper.yaml").returncode == 3

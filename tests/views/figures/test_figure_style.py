@@ -179,7 +179,7 @@ def test_overlapping_lines_differ_in_brightness_and_style(looks):
     assert one.style != other.style
 
 
-def test_brightness_is_computed_as_grey_value():
+def test_brightness_of_a_grey_is_its_grey_value():
     assert brightness("#000000") == 0.0
     assert brightness("#ffffff") == pytest.approx(1.0)
     assert brightness(to_hex("0.5")) == pytest.approx(128 / 255)
