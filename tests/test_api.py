@@ -66,7 +66,7 @@ def test_type_stub_lists_the_same_names():
     assert walkerlab.__all__ == api.__all__
 
 
-def test_importing_the_package_loads_nothing():
+def test_importing_the_package_loads_no_third_party_package():
     command = "import sys; before = set(sys.modules); import walkerlab; print(*(set(sys.modules) - before))"
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
@@ -468,12 +468,12 @@ def test_mujoco_model_with_changed_keys_starts_in_the_new_gait(mujoco):
     assert data.qpos[2] - np.deg2rad(3) == pytest.approx(steeper.state[1], abs=1e-12)
 
 
-def test_mujoco_model_without_a_gait_raises_the_error_no_answer(mujoco):
+def test_mujoco_model_without_a_gait_raises_no_answer_error(mujoco):
     with pytest.raises(NoAnswer, match="no gait"):
         walkerlab.mujoco_model(walkerlab.find_gait(slope_deg=-1))
 
 
-def test_mujoco_model_accepts_blocks_and_tilt_option(mujoco):
+def test_mujoco_model_accepts_config_blocks_and_a_slope_option(mujoco):
     heavy = walkerlab.compass(hip_mass_kg=20)
     model, _ = walkerlab.mujoco_model("paper", slope="geometry", walker=heavy)
     assert model.body_subtreemass[model.joint("height").bodyid[0]] == pytest.approx(30.0)

@@ -185,7 +185,7 @@ def commands_around_runs():
 
 
 @pytest.mark.parametrize("command", commands_around_runs())
-def test_documented_run_commands_have_their_options(command):
+def test_commands_for_runs_in_the_docs_use_only_existing_options(command):
     _, name, *words = shlex.split(command)
     asked = whole_program().commands[name]
     if words:

@@ -365,7 +365,7 @@ def test_walker_of_an_extension_has_the_gait_of_equal_straight_legs(site):
     assert "length of a rod" in " ".join(site("schema", "walker").stdout.split())
 
 
-def test_unknown_key_of_an_extension_walker_is_refused_with_the_nearest(site):
+def test_unknown_key_of_an_extension_walker_is_refused_with_the_nearest_key(site):
     install_rods(site)
     (site.folder / "rods.yaml").write_text("name: rods\nwalker: {type: rods, leg_mas_kg: 4}\n")
     done = site("fixedpoint", "-c", "rods.yaml")
@@ -513,7 +513,7 @@ def test_duplicate_names_are_an_error_in_every_command(site, message):
     assert "second" in site("extensions").stdout
 
 
-def test_extensions_of_equal_name_are_an_error(site):
+def test_two_extensions_with_the_same_name_are_reported(site):
     add(site.packages, "first", extension(), same="first:EXTENSION")
     add(site.packages, "second", extension(), same="second:EXTENSION")
     assert "first 1.0 and second 1.0 both add the extension same." in site("schema", "seed").stderr
@@ -540,7 +540,7 @@ def test_unchanged_folders_are_not_scanned_again(site):
     assert site.python(SCANNED).stdout.split() == ["new", "True"]
 
 
-def test_without_a_cache_folder_each_process_scans(site):
+def test_each_process_scans_for_extensions_if_there_is_no_cache_folder(site):
     install_example(site.packages)
     for _ in range(2):
         done = site.python(SCANNED, environment={"XDG_CACHE_HOME": "nowhere"})
@@ -605,6 +605,6 @@ def test_study_runs_from_a_copy_outside_the_package(site):
     assert judged["paper_numbers"] == expected["paper_numbers"]
 
 
-def test_extension_lists_all_code_that_it_names():
+def test_extension_lists_all_the_code_it_registers():
     everything = Extension(1, figures="a:A", sections={"task": ("b:B",)}, friction={"icy": "c:C"})
     assert [*everything.code()] == ["a:A", "b:B", "c:C"]

@@ -440,7 +440,7 @@ def test_kernels_built_from_other_sources_are_not_used(built):
     assert why.startswith("sources differs: ")
 
 
-def test_damaged_packaged_kernel_is_compiled_once(built):
+def test_damaged_packaged_kernel_is_recompiled_only_once(built):
     package, run = built
     (file,) = (package / "physics" / "machine_code").glob("*.kernel")
     file.write_bytes(file.read_bytes()[:-1])

@@ -16,7 +16,7 @@ FENCED = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
 BLOCKS = [block for language, block in FENCED if not language]
 
 
-def test_first_command_after_the_install_takes_seconds():
+def test_readme_shows_fixedpoint_as_the_first_command_after_the_install():
     after = README.partition("```\npip install .\n```\n")[2]
     assert after.index("$ walkerlab fixedpoint") == after.index("$ walkerlab ")
     assert after.index("$ walkerlab fixedpoint") < after.index("```\nwalkerlab")

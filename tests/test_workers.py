@@ -36,7 +36,7 @@ def test_results_come_in_the_order_of_the_calls():
     assert list(map_in_order([partial(calls.square, n) for n in range(7)], jobs=3)) == [n * n for n in range(7)]
 
 
-def test_single_job_and_first_calls_run_in_this_process():
+def test_calls_run_in_this_process_if_there_is_one_job_or_they_are_listed_as_first():
     assert set(map_in_order([calls.own_id] * 3, jobs=1)) == {os.getpid()}
     ids = list(map_in_order([calls.own_id] * 3, jobs=2, first=(1,)))
     assert ids[1] == os.getpid()
@@ -105,7 +105,7 @@ def test_dead_worker_is_reported_and_replaced(pool, call, how):
     assert [future.result() for future in [*others, pool.submit(calls.square, 5)]] == [0, 1, 4, 9, 25]
 
 
-def test_death_of_an_idle_worker_loses_no_call():
+def test_no_call_is_lost_when_an_idle_worker_dies():
     with WorkerPool(1) as pool:
         first = pool.start(calls.own_id).result()
         os.kill(first, signal.SIGKILL)

@@ -139,7 +139,7 @@ def test_slice_has_only_the_keys_of_its_type(key: str) -> None:
         getattr(given, name)
 
 
-def test_part_of_a_block_is_read_in_part_whether_or_not_annotations_are_postponed() -> None:
+def test_slice_lists_only_the_keys_it_reads_even_if_annotations_are_postponed() -> None:
     module = """
 from typing import Protocol
 

@@ -158,7 +158,7 @@ def test_settings_leave_the_original_config_unchanged() -> None:
     assert plain(tree) == plain(load(None).tree)
 
 
-def test_time_for_settings_is_linear_in_their_number() -> None:
+def test_time_to_apply_settings_is_linear_in_their_number() -> None:
     """Eight times as many settings take far less than 64 times as long."""
     took = []
     for count in (2_000, 16_000):

@@ -404,7 +404,7 @@ def test_leg_length_that_contradicts_the_parts_is_rejected(refused: Refused) -> 
         ("walker.leg_mass_kg=5000", "walker.leg_mass_kg is 5000 kg on legs of 1 m; masses are in kg, not in g"),
     ],
 )
-def test_value_perhaps_in_another_unit_raises_a_warning(setting: str, said: str) -> None:
+def test_value_that_may_be_in_another_unit_raises_a_warning(setting: str, said: str) -> None:
     assert load(sets=[setting]).warnings == (f"--set {setting}: {said}",)
 
 

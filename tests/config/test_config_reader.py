@@ -99,7 +99,7 @@ def test_columns_of_an_embedded_text_are_counted_from_its_start() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "---\n"])
-def test_empty_text_has_no_content(text: str) -> None:
+def test_file_without_any_keys_is_read_as_empty(text: str) -> None:
     root = read(text, "f.yaml")
     assert root is None or plain(root) is None
 

@@ -173,7 +173,7 @@ def test_adams_commands_lock_the_knees_of_unequal_legs_at_the_right_times(walker
 
 
 @pytest.mark.parametrize("seed", [0, 2], ids=["ideal lock", "push-off"])
-def test_commands_switch_the_knees_at_sensors_and_reproduce_our_walk(seed):
+def test_adams_commands_lock_and_release_knees_at_sensors_and_reproduce_our_walk(seed):
     """A script runs ten walkers of five kinds for three strides."""
     touches, locks, walk = run_kneed(*random_kneed_walker(seed, 1))
     assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)
@@ -222,7 +222,7 @@ def test_exported_adams_model_has_no_redundant_constraint():
     assert np.abs(g @ torso.start[1]).max() < 1e-9
 
 
-def test_contact_statements_have_adams_parameters_and_two_lanes():
+def test_contacts_have_the_adams_parameters_and_pads_lie_in_two_lanes():
     dataset = dataset_of("contact", "paper")
     shapes = {s.id: s for s in dataset.of("GRAPHICS")}
     corners = {s.id: s.numbers("QP", (0.0, 0.0, 0.0)) for s in dataset.of("MARKER")}

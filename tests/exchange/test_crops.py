@@ -25,7 +25,7 @@ def test_all_strikes_of_a_cropped_recording_are_found_near_the_true_times(tmp_pa
     assert max(error for each in counts for error in each.errors) < 5.0
 
 
-def test_error_bar_of_a_strike_just_after_the_start_contains_its_error(tmp_path):
+def test_error_of_a_strike_just_after_the_start_is_below_five_standard_errors(tmp_path):
     """The few samples before the strike must not distort the fit of those after it."""
     crops = campaign()
     for crop in (crops.Crop(1.39467, 4.218, 240.0, 1.75e-3, -1.0), crops.Crop(0.69340, 3.98, 25.0, 1.75e-4, -1.0)):
@@ -42,7 +42,7 @@ def test_strike_on_a_sample_of_a_slow_film_is_not_missed(tmp_path):
     assert max(error for each in counts for error in each.errors) < 5.0
 
 
-def test_error_bar_of_a_strike_found_at_the_first_sample_reaches_back_to_the_true_one(tmp_path):
+def test_error_bar_of_a_strike_found_late_at_the_first_sample_covers_the_true_time(tmp_path):
     """The strike is 9 ms before the first sample. If it is found at that sample, its error bar must reach back that
     far.
     """
@@ -54,7 +54,7 @@ def test_error_bar_of_a_strike_found_at_the_first_sample_reaches_back_to_the_tru
     assert max(each[0] for each in errors) < 3.0
 
 
-def test_slow_film_without_noise_is_not_cut_at_a_strike(tmp_path):
+def test_no_heel_strike_is_missed_in_a_slow_film_without_noise(tmp_path):
     """With the strike elsewhere, the error of the polynomials looks like a sensor that slips."""
     crops = campaign()
     crop = crops.Crop(1.4243780296881074, 4.93539416202693, 25.0, 0.0, -1.0)

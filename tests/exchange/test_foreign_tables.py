@@ -105,7 +105,7 @@ def test_cell_that_is_not_a_number_is_quoted(cell, tmp_path):
         read(tmp_path, "walk.csv", table(rows, delimiter=";"))
 
 
-def test_decimal_commas_in_a_file_separated_by_commas_get_advice(tmp_path):
+def test_decimal_commas_in_a_comma_separated_file_are_rejected_with_advice(tmp_path):
     with pytest.raises(ConfigError, match="no header") as caught:
         read(tmp_path, "walk.csv", table(with_commas()))
     assert "decimal commas need semicolons, tabs or quotes" in caught.value.advice
@@ -327,7 +327,7 @@ def test_gaps_at_both_ends_are_cut(tmp_path):
 # OpenSim
 
 
-def test_labels_with_spaces_are_split_at_tabs(tmp_path):
+def test_columns_whose_labels_contain_spaces_are_split_at_tabs(tmp_path):
     text = opensim(labels=("time", "right thigh", "left thigh"))
     assert holds_the_walk(read(tmp_path, "walk.mot", text, {"angle 1": "right thigh", "angle 2": "left thigh"}))
 
@@ -371,7 +371,7 @@ def test_motion_file_without_version_and_degrees_needs_a_unit(tmp_path):
         ("mass_A\nt\tx\ty\n0.0\t1.0\t2.0\n0.1\t1.1\t2.1\n", "Tracker"),
     ],
 )
-def test_unsupported_table_names_its_program(beginning, program, tmp_path):
+def test_error_for_an_unsupported_table_names_the_program_that_wrote_it(beginning, program, tmp_path):
     with pytest.raises(ConfigError, match=f"is a table of {program}") as caught:
         read(tmp_path, "walk.csv", beginning)
     assert re.search(r"\.c3d|time \(s\)", caught.value.advice)

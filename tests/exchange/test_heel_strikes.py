@@ -405,7 +405,7 @@ def test_leg_whose_length_changes_along_the_walk_is_reported(tmp_path):
 
 
 @pytest.mark.parametrize("first", [30, 100, 180, 250])
-def test_swapped_feet_with_sideways_distance_are_corrected(first, tmp_path):
+def test_swapped_feet_are_corrected_if_they_are_separated_sideways(first, tmp_path):
     places = places_of(sampled()[1])
     places[first : first + 10, [1, 2]] = places[first : first + 10, [2, 1]]
     summary = read_places(tmp_path, places)
@@ -413,7 +413,7 @@ def test_swapped_feet_with_sideways_distance_are_corrected(first, tmp_path):
     assert f"The legs are swapped at samples {first + 1} to {first + 10}" in summary["doubts"][0]
 
 
-def test_running_is_rejected(tmp_path):
+def test_recording_of_a_running_gait_is_rejected(tmp_path):
     """A runner's hip is lowest as the legs pass each other."""
     places = places_of(sampled()[1])
     spread = np.abs(places[:, 1, 0] - places[:, 2, 0])
@@ -461,7 +461,7 @@ def test_noise_of_a_film_neither_hides_a_strike_nor_raises_a_doubt_about_the_clo
     assert not any("times as fast" in doubt for doubt in summary["doubts"])
 
 
-def test_heel_strike_of_a_noisy_film_is_sought_where_the_foot_came_down(tmp_path):
+def test_heel_strike_of_a_noisy_film_is_found_where_the_foot_comes_down(tmp_path):
     """If the feet stay almost level after a strike, noise makes them cross several times, and the mean of the crossings
     is 0.1 s late.
     """

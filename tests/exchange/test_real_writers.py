@@ -280,14 +280,14 @@ def poses():
 
 
 @pytest.mark.parametrize("writer", ["to_dlc_file", "to_lp_file"])
-def test_poses_written_by_the_package_movement_are_read_with_three_header_rows(writer, tmp_path):
+def test_poses_written_by_the_movement_package_are_read(writer, tmp_path):
     save_poses, data = poses()
     getattr(save_poses, writer)(data, tmp_path / "film.csv")
     doubts = walk_right(tmp_path, "film_walker.csv", columns=LEGS, fps=FPS, min_likelihood=0.6)
     assert "FOOT1.x, FOOT1.y at samples 201 to 205 (likelihoods below 0.6" in doubts[0]
 
 
-def test_poses_written_by_the_package_movement_may_name_an_individual(tmp_path):
+def test_individual_named_in_poses_from_the_movement_package_is_read(tmp_path):
     save_poses, data = poses()
     save_poses.to_dlc_file(data, tmp_path / "film.csv", split_individuals=False)
     columns = {name: line.replace("HIP", "walker.HIP").replace("FOOT", "walker.FOOT") for name, line in LEGS.items()}

@@ -142,7 +142,7 @@ def test_angles_are_computed_from_pairs_of_markers(tmp_path):
     assert walk.quantities["hip_along_m"] == pytest.approx(0.1 * TIMES, abs=1e-12)
 
 
-def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
+def test_markers_are_read_with_z_upwards_and_a_walk_in_the_negative_direction(tmp_path):
     turned = markers()[:, :, [2, 0, 1]] * [1.0, -1.0, 1.0]
     path = written(tmp_path, "walk.trc", marker_file(TIMES, turned))
     walk = as_walk(read_recording(path), Recorded(columns={"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}))

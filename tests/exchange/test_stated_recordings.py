@@ -71,7 +71,7 @@ def test_constant_offset_without_an_angle_unit_is_refused(source, message, tmp_p
         read(tmp_path, time, angle, columns={"angle 1": source})
 
 
-def test_angles_from_the_horizontal_are_refused_with_the_option_that_turns_them(tmp_path):
+def test_error_for_angles_from_the_horizontal_suggests_the_offset_to_add(tmp_path):
     time, angle = sampled()
     with pytest.raises(ConfigError, match=r"is about -8[89] degrees") as refused:
         read(tmp_path, time, np.degrees(angle) - 90.0, "time (s),right thigh (deg),angle 2 (deg)",
@@ -86,7 +86,7 @@ def test_quotes_protect_commas_in_options():
     }
 
 
-def test_angle_of_a_marker_line_may_have_an_offset_but_no_sign(tmp_path):
+def test_angle_of_a_marker_line_may_be_offset_but_not_negated(tmp_path):
     places = places_of(sampled()[1])
     turn = np.array([[math.cos(TILT), -math.sin(TILT)], [math.sin(TILT), math.cos(TILT)]])
     places[:, 1, :2] = places[:, 0, :2] + (places[:, 1, :2] - places[:, 0, :2]) @ turn.T
@@ -159,7 +159,7 @@ def steps_of(path, **keys):
 
 
 @pytest.mark.parametrize("name", ["frame", "Frame#", "frame_idx", "n"])
-def test_frames_become_times_by_their_rate(name, tmp_path):
+def test_frame_numbers_are_converted_to_times_by_the_frame_rate(name, tmp_path):
     time, angle = sampled(fps=240.0)
     kept = np.delete(np.arange(time.size), [300, 301])
     path = table(tmp_path, f"{name},angle 1 (rad),angle 2 (rad)", [(17 + n, *angle[n]) for n in kept])
@@ -241,7 +241,7 @@ def test_table_without_times_counts_samples_as_frames(tmp_path):
     assert all_steps_are_right(steps_of(path, fps=60.0), period=2e-5, length=2e-5)
 
 
-def test_column_stated_as_frames_must_count_them(tmp_path):
+def test_time_column_is_rejected_if_it_is_stated_as_frame_numbers(tmp_path):
     time, angle = sampled()
     path = table(tmp_path, "seconds,angle 1 (rad),angle 2 (rad)", zip(time, *angle.T, strict=True))
     with pytest.raises(ConfigError, match="'seconds' does not count frames"):

@@ -74,7 +74,7 @@ def test_interrupted_campaign_resumes_with_the_same_result(toy, monkeypatch):
     assert read(toy.runs / "paper" / "census.h5").digest() == undisturbed.digest()
 
 
-def test_campaign_parts_of_another_key_are_ignored(toy, monkeypatch):
+def test_campaign_parts_stored_under_a_different_key_are_ignored(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     toy.edit("census", "0.1 * number", "0.2 * number")
     monkeypatch.setenv("TOY_STONES", "3")

@@ -23,7 +23,7 @@ def test_design_from_python_writes_its_config_once(tmp_path):
     assert list(path.parent.glob("*.yaml")) == [path]
 
 
-def test_written_config_extends_the_file_as_it_was_loaded(tmp_path):
+def test_written_config_names_the_optimum_even_if_the_extended_file_has_changed_to_it(tmp_path):
     """If the file then changes to the optimum, the written config still names the parameter."""
     start = tmp_path / "start.yaml"
     start.write_text("extends: slope-3deg\nname: start\n")

@@ -53,7 +53,7 @@ def test_keys_that_a_stage_reads_exist_in_the_config(name):
 
 
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
-def test_table_names_the_config_type_in_the_signature_of_the_stage(stage):
+def test_stage_table_and_signature_of_a_stage_name_the_same_config_types(stage):
     module = importlib.import_module(stage.module)
     named = {stage.takes_under(load(Path(name)).config) or Config for name in ("paper", "kneed")}
     first = next(iter(inspect.signature(module.run, eval_str=True).parameters.values())).annotation
@@ -95,7 +95,7 @@ def test_cases_of_the_paper_apply_only_to_its_walker():
 
 
 @pytest.mark.parametrize("stage", ["simulate", "fixedpoint"])
-def test_walk_without_error_estimate_has_another_key(stage):
+def test_walk_without_an_error_estimate_has_a_different_key(stage):
     config, keys = load().config, Keys()
     once, twice = (keys.identity(PIPELINE[stage], config, {}, again).key for again in (False, True))
     assert once != twice
@@ -146,11 +146,11 @@ def test_graph_without_an_import_path_cannot_be_pickled():
         pickle.dumps(Graph(Stage("a", "m", "", object)))
 
 
-def test_inputs_given_by_results_of_are_the_same_for_every_config():
+def test_results_of_returns_the_same_inputs_for_every_config():
     assert results_of("a", "b")(load().config) == ("a", "b")
 
 
-def test_table_imports_neither_config_nor_arrays():
+def test_importing_the_stage_table_loads_no_heavy_packages():
     heavy = "'numpy', 'h5py', 'scipy', 'numba', 'pydantic', 'ruamel'"
     code = f"import sys, walkerlab.pipeline.plan.graph; print([name for name in ({heavy}) if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -178,7 +178,7 @@ def test_stage_without_an_answer_stores_the_reason_and_reports_it_again_when_reu
     assert read(first.artifact)["fall"]["height"][0] == 1.0
 
 
-def test_stages_after_one_without_an_answer_still_run(toy):
+def test_stage_is_left_out_if_a_stage_it_needs_has_no_answer(toy):
     report = toy.execute("roll", STEEP)
     assert actions(report) == {"drop": "run", "roll": "leave out"}
     assert report.artifact is None
@@ -192,7 +192,7 @@ def test_walk_on_a_slope_without_a_gait_is_simulated_from_a_given_start(toy):
     assert report.no_answer is None
 
 
-def test_page_without_an_answer_is_written_and_says_so(toy):
+def test_page_is_written_and_gives_the_reason_if_there_is_no_answer(toy):
     report = toy.execute("page", STEEP)
     assert report.artifact is not None
     assert report.no_answer is not None
@@ -324,7 +324,7 @@ def test_second_run_imports_no_stage(toy):
     assert done.stdout.splitlines() == ['{"reused": true}', "[]"], done.stderr
 
 
-def test_result_of_equal_key_is_reused_from_another_run(toy, listener):
+def test_result_with_the_same_key_is_reused_from_another_run(toy, listener):
     toy.execute("bounce")
     config, folder = toy.loaded("strides=7")
     assert toy.preview("bounce", "strides=7").reused

@@ -65,7 +65,7 @@ def test_adams_units_of_the_paper_are_converted_to_si():
     assert isinstance(walker.friction, Coulomb)
 
 
-def test_static_penetration_is_for_the_whole_weight_on_one_foot():
+def test_static_penetration_is_computed_for_the_whole_weight_on_one_foot():
     """It is 0.059 mm, and the contact is over-damped. Compare both with values computed in N and mm."""
     scene = scene_of()
     depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
@@ -77,7 +77,7 @@ def test_static_penetration_is_for_the_whole_weight_on_one_foot():
     assert measures["damping_ratio"] > 1.0
 
 
-def test_frictionless_scene_has_a_law_of_another_type():
+def test_frictionless_scene_uses_a_frictionless_law():
     config = load(None, ("contact.friction=none",)).config
     scene = contact_scene(config, STEP)
     assert isinstance(scene.walker.friction, Frictionless)

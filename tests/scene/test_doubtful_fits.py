@@ -204,7 +204,7 @@ def test_bound_that_excludes_the_truth_is_reported():
     assert "the bound of 0.99 for" in result.verdict.reasons[0]
 
 
-def test_bound_without_influence_raises_no_doubt():
+def test_bound_half_a_standard_error_from_the_estimate_does_not_make_the_fit_doubtful():
     free = values(identify(measured_steps(), fit={"slope_deg": None, LEG: None}))[LEG]
     edge = free.value - 0.5 * free.standard_error
     result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, edge]})
@@ -231,7 +231,7 @@ def fitted_with_sensitivities(key):
     return values(result), {entry.estimate: entry for entry in result.sensitivities if entry.to == key}
 
 
-def test_one_percent_of_a_zero_inertia_is_relative_to_leg_mass_times_length_squared():
+def test_one_percent_step_from_zero_inertia_is_scaled_by_leg_mass_times_length_squared():
     _, entries = fitted_with_sensitivities("walker.leg_inertia_kg_m2")
     assert [entry.change for entry in entries.values()] == pytest.approx([0.01 * 5.0 * 1.0**2] * 2)
     assert fitted_with_sensitivities("walker.hip.torque_N_m")[1] == {}
@@ -298,7 +298,7 @@ def test_steps_that_hardly_show_a_wrong_leg_length_still_suggest_the_right_one(l
     assert (better, fixed) == (pytest.approx(1.0, abs=2e-3), leg)
 
 
-def test_predicted_gain_of_freeing_a_doubted_parameter_is_close_to_that_of_a_refit():
+def test_predicted_gain_of_estimating_a_doubted_parameter_agrees_with_a_refit():
     *_, model, start = walker()
     measured = MeasuredWalk(*measure_steps(model, start, np.random.default_rng(11), steps=20))
     wrong = identify(measured, LEG + "=1.004", fit={"slope_deg": None, HIP: None})

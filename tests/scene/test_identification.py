@@ -50,7 +50,7 @@ def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
     assert np.all((ratio > 0.4) & (ratio < 3.0))
 
 
-def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
+def test_multipliers_estimated_from_measured_steps_are_corrected_for_noise():
     """By plain least squares they would be a quarter too small."""
     paper = truth("steps", "paper", CAMPAIGN["WALKERS"]["paper"])
     measured = [paper.identify(*paper.walk(seed)).measured_radius for seed in range(8)]
@@ -68,7 +68,7 @@ def test_quantity_without_variation_does_not_change_the_multiplier():
     assert 0.3 < spectral_radius(lengths) < 0.8
 
 
-def test_quick_refit_stays_at_the_estimate_of_a_soft_loss():
+def test_quick_refit_keeps_the_estimate_of_a_fit_with_a_soft_loss():
     """Without trimming, the outlier would move the estimate."""
     measured, _ = truth().walk(0)
     periods = measured.periods_s.copy()
@@ -254,7 +254,7 @@ def wrong_walks():
 
 
 @pytest.mark.parametrize("name", ["limp", "missed step", "mm for m", "ms for s"])
-def test_limping_walks_missed_steps_and_wrong_units_do_not_fit(name):
+def test_model_does_not_fit_limps_or_data_with_missed_steps_or_wrong_units(name):
     try:
         result = identify(wrong_walks()[name])
     except NoAnswer as error:

@@ -78,7 +78,7 @@ def test_walker_of_parts_with_different_shanks_has_different_legs(tmp_path):
     (["walker.leg_2={mass: 1}"], "mass"),
     ([HEAVY, "equations=as-printed"], "compass"),
 ])  # fmt: skip
-def test_invalid_keys_of_leg_2_are_refused_by_name(settings, reason):
+def test_invalid_settings_of_leg_2_are_rejected_with_the_reason(settings, reason):
     with pytest.raises(ConfigError, match=reason):
         config_of("paper", *settings)
 
@@ -161,7 +161,7 @@ def test_exchanged_labels_give_the_same_contact_gait_half_a_stride_later(name, f
     assert abs(one.multipliers[0]) == pytest.approx(abs(other.multipliers[0]), rel=1e-4)
 
 
-def test_damped_knee_takes_the_same_work_from_both_models():
+def test_damped_knee_dissipates_the_same_energy_in_both_models():
     config = config_of("kneed", "walker.knee.damping_N_m_s_per_rad=0.01", "strides=4")
     rigid = gait_of(config)
     scene = scene_on_pads(config, rigid.step_length, rigid.state)
@@ -172,7 +172,7 @@ def test_damped_knee_takes_the_same_work_from_both_models():
     assert walk.driven.hip == 0.0
 
 
-def test_spring_at_the_hip_and_dampers_at_the_knees_do_separate_work():
+def test_work_of_the_hip_spring_is_recorded_separately_from_that_of_the_knee_dampers():
     spring = 0.2
     sets = ("walker.knee.damping_N_m_s_per_rad=0.01", f"walker.hip.spring_N_m_per_rad={spring}")
     config = config_of("kneed", *sets, "contact.terrain=plane")
@@ -263,7 +263,7 @@ def test_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     assert content.summary["bifurcations"] == []
 
 
-def test_flips_of_legs_that_differ_lie_on_a_curve_over_slope_and_mass():
+def test_flip_curve_of_unequal_legs_has_the_multiplier_minus_one_at_both_ends():
     second = "{over: walker.leg_2.leg_mass_kg, from: 3.95, to: 4.05}"
     block = f"{{over: slope_deg, from: 2.2, to: 2.35, model: rigid, periods: 2, points: 12, second: {second}}}"
     config = config_of("prosthesis", f"continuation={block}")
@@ -300,7 +300,7 @@ def test_walker_with_one_knee_and_a_straight_leg_settles_on_its_gait_on_complian
     assert math.sqrt(abs(gait.multipliers[0])) == pytest.approx(rigid.spectral_radius, rel=0.05)
 
 
-def test_multipliers_of_a_one_kneed_walker_on_compliant_ground_equal_differences():
+def test_multipliers_of_a_one_kneed_walker_on_compliant_ground_equal_difference_quotients():
     config = config_of("one-knee", ONE_KNEE_GROUND)
     rigid = gait_of(config)
     gait = contact_gait(config, rigid.step_length, rigid.state).gait

@@ -102,18 +102,18 @@ def test_walk_of_equal_legs_is_not_called_a_limp():
 
 
 @pytest.mark.parametrize(("heavier", "leg"), [(HEAVIER, 1), (HEAVIER, 2), (-0.8, 1)])
-def test_limp_of_equal_legs_suggests_the_option_that_explains_it(heavier, leg):
+def test_fitting_equal_legs_to_a_limp_suggests_the_option_that_explains_it(heavier, leg):
     result = identify(begun(measured(heavier, "steps"), leg), "slope_deg")
     assert result.verdict.fit in ("fits-but", "misfit")
     assert any(f"--fit {MASS}" in reason for reason in result.verdict.reasons)
 
 
-def test_equal_steps_do_not_suggest_a_second_leg():
+def test_equal_steps_do_not_suggest_different_legs():
     result = identify(begun(measured(0.0, "steps"), 1), "slope_deg")
     assert not any("leg_2" in reason for reason in result.verdict.reasons)
 
 
-def test_difference_of_two_estimates_has_the_error_of_both():
+def test_error_of_a_leg_difference_includes_the_covariance_of_both_estimates():
     result = identify(begun(measured(HEAVIER, "steps"), 1, stated=1), MASS, "walker.leg_mass_kg")
     first, second = (next(each for each in result.estimates if each.key == key) for key in ("walker.leg_mass_kg", MASS))
     (difference,) = result.leg_differences

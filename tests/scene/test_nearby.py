@@ -34,7 +34,7 @@ def gait_of(found):
 
 
 @pytest.mark.parametrize("degrees", [2, 3, 4, 5])
-def test_kneed_walker_without_gait_is_pointed_to_steeper_slopes(degrees):
+def test_slopes_with_stable_gaits_are_found_for_a_kneed_walker_that_has_none(degrees):
     one = config(KNEED, f"slope_deg={degrees}", base=Path("kneed"))
     assert gait_of(one) is None
     low, high = (math.degrees(value) for value in find_slopes_with_gaits(one).stable)
@@ -54,7 +54,7 @@ def test_suggested_command_finds_a_stable_gait(slope):
 
 
 @pytest.mark.parametrize("degrees", [1.4, 2.5, 4.0])
-def test_kneed_walker_without_gait_is_advised_to_move_its_feet_ahead(degrees):
+def test_advice_for_a_kneed_walker_without_a_gait_is_to_move_its_feet_ahead(degrees):
     sets = (MCGEER, f"slope_deg={degrees}")
     assert gait_of(config(*sets, base=Path("kneed"))) is None
     advice = add_run_options(suggest_gaits(config(*sets, base=Path("kneed"))), lambda _: " -c mcgeer.yaml")

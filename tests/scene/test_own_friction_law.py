@@ -78,7 +78,7 @@ class Wordless(NamedTuple):
     largest = rising_until = property(lambda self: self.mu)
 
 
-def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
+def test_error_lists_what_an_incomplete_friction_law_lacks(monkeypatch):
     monkeypatch.setitem(FRICTION_LAWS.laws, "coulomb", Wordless)
     with pytest.raises(ConfigError) as said:
         contact_scene(load().config, 0.3714)
@@ -105,7 +105,7 @@ def test_law_with_several_formulas_must_define_their_switching_points(own, monke
         contact_scene(load().config, 0.3714)
 
 
-def test_compiled_walk_names_the_friction_law_that_has_no_formula(own):
+def test_error_of_a_compiled_walk_names_the_friction_law_that_lacks_a_formula(own):
     wordless = replace(own, walker=own.walker._replace(friction=Wordless(0.5)))
     with pytest.raises(TypeError, match=r"^friction_coefficient has no case for Wordless: "):
         wordless.walk(start_state(own, START), 1, Tolerances("radau5", 1e-7, 1e-9, 1000))
@@ -132,7 +132,7 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
-def test_slope_bound_covers_a_friction_law_that_drops_faster_than_it_rises():
+def test_steepness_bound_holds_for_a_friction_law_that_drops_faster_than_it_rises():
     law = Coulomb(static=0.9, dynamic=0.7, stiction_velocity=0.1, friction_velocity=0.11)
     span = 1e-4
     changes = [
@@ -180,7 +180,7 @@ def test_unresolved_slip_of_any_law_is_reported(own):
     assert "0.3 m/s" in said[0]
 
 
-def test_engines_are_tuned_to_the_creep_of_any_law(own):
+def test_creep_target_for_engines_is_computed_from_any_friction_law(own):
     target = contact_target(SimpleNamespace(ours=own.walker))
     assert target.friction == pytest.approx(0.7 * math.tanh(3.0))
     assert target.creep_velocity == pytest.approx(0.1 * math.atanh(CREEP_LOAD / 0.7), rel=1e-9)

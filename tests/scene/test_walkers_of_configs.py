@@ -80,7 +80,7 @@ def by_its_parts(radius_m):
 
 
 @pytest.mark.parametrize("radius_m", [0.0, 0.2])
-def test_kneed_walker_with_feet_ahead_equals_its_description_by_parts(radius_m):
+def test_kneed_walker_with_feet_ahead_equals_the_same_walker_described_part_by_part(radius_m):
     own, parts = kneed_with_feet_ahead(radius_m), by_its_parts(radius_m)
     one, other = rigid_walker(own), rigid_walker(parts)
     assert one.lean == pytest.approx(math.atan2(0.03, 1.0 - radius_m), rel=1e-15)
@@ -102,7 +102,7 @@ def test_gait_of_a_kneed_walker_with_feet_ahead_agrees_with_independent_code():
     assert gait.spectral_radius == pytest.approx(0.3333740739, abs=1e-8)
 
 
-def test_start_with_feet_ahead_is_computed_on_the_slope():
+def test_both_feet_touch_the_slope_at_the_start_if_foot_centres_lie_ahead():
     start = "start=[null, 0.26, null, -0.49, -1.157, -0.49]"
     config = kneed_with_feet_ahead(0.2)
     moved = load(Path("kneed"), ["slope_deg=2.5", "walker.foot_radius_m=0.2", "walker.foot_centre_ahead_m=0.03", start])

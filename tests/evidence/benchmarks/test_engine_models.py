@@ -224,7 +224,7 @@ def test_walk_with_nan_states_counts_as_solver_failure(scene):
     assert rules.outcome is Outcome.SOLVER_FAILED
 
 
-def test_walker_with_a_low_hip_has_fallen(scene):
+def test_walker_whose_hip_is_too_low_counts_as_fallen(scene):
     q, v = scene.from_base(scene.start)
     rules = RuleFollower(scene, 4, q, v)
     rules.follow(1e-3, q - np.array((0.0, 0.6, 0.0, 0.0)), v)
@@ -243,7 +243,7 @@ def test_touch_time_is_interpolated_by_a_cubic_between_solver_steps():
     assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
 
 
-def test_contact_is_tuned_to_the_law_under_the_weight_of_the_walker():
+def test_engine_contact_is_tuned_to_match_our_force_law_at_the_weight_of_the_walker():
     scene = compass()
     target = contact_target(scene)
     law = scene.ours.normal

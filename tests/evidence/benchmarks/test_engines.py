@@ -106,18 +106,18 @@ def test_speed_ratios_use_the_fastest_sufficiently_accurate_runs():
     assert found["1e-5"]["drake"] == pytest.approx(2.0 / 0.006)
 
 
-def test_closest_contact_is_judged_at_its_smallest_step():
+def test_closest_contact_is_chosen_by_the_error_at_the_smallest_step_size():
     best = closest(ROWS)
     assert (best["engine"], best["contact"]) == ("drake", "lagged")
     assert best["period_error_s"] == pytest.approx(6e-4)
 
 
-def test_contact_with_an_unfinished_walk_is_not_the_closest():
+def test_contact_whose_walk_is_unfinished_is_not_chosen_as_closest_to_the_force_law():
     fallen = [replace(one, error=None, outcome="fell") if one.engine == "drake" else one for one in ROWS]
     assert closest(fallen)["engine"] == "mujoco"
 
 
-def test_step_size_suffices_only_if_three_digits_hold_at_every_smaller_one():
+def test_step_size_suffices_only_if_it_and_all_smaller_ones_give_three_digits():
     steps = three_digits(ROWS, truth())
     assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
     # The period with MuJoCo's own contact is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest.

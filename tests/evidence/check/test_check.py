@@ -96,7 +96,7 @@ def test_unexplained_state_of_a_kneed_walker_raises_no_error():
     assert answer.finding == "different, unexplained"
 
 
-def test_mistake_is_found_in_conventions_that_are_not_stated():
+def test_mistake_is_found_under_a_convention_other_than_the_stated_one():
     """The script that computed the state has a wrong strike, and its relative second angle is taken for an absolute
     one.
     """
@@ -160,7 +160,7 @@ def test_checks_of_published_gaits_have_the_documented_findings(name, finding):
     assert (answer["finding"], answer["routes"]["agree"]) == (finding, True)
 
 
-def test_multiplier_of_minus_one_is_explained_by_a_start_on_the_heel_strike():
+def test_extra_multiplier_of_minus_one_is_explained_by_a_section_at_the_heel_strike():
     gait = walkerlab.find_gait()
     multipliers = [f"{one.real:.4f}{one.imag:+.4f}i" for one in gait.multipliers]
     answer = walkerlab.check("paper", {"multipliers": [*multipliers[:2], "-1.0000"], "period_s": "0.7036"})
@@ -237,14 +237,14 @@ def test_misprinted_parameter_is_found():
     assert all("is accepted as soon as" in what for what in told[1:])
 
 
-def test_lost_sign_and_transposed_digits_are_misprints():
+def test_lost_sign_and_transposed_digits_are_recognised_as_misprints():
     lost = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "0.605819", "-0.861041"]})
     swapped = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "-0.605819", "-0.816041"]})
     assert lost.explanations[0]["what"] == "the sign of the printed swing rate is wrong"
     assert swapped.explanations[0]["what"] == "two digits of the printed stance rate are transposed"
 
 
-def test_single_printed_value_that_differs_is_not_explained():
+def test_one_wrong_printed_value_is_reported_as_unexplained():
     answer = walkerlab.check("paper", {"period_s": "0.7064"})
     assert (answer.finding, answer.explanations) == ("different, unexplained", [])
 

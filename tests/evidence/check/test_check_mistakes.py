@@ -30,13 +30,13 @@ def first_gait_with(mistake, found, step=mistaken_walks.step):
     return next((legs, each) for legs, each in gaits if each is not None)
 
 
-def test_hand_written_walker_has_the_same_gait(walker):
+def test_hand_written_walker_has_the_same_gait_as_the_package(walker):
     legs, state = walker
     found, _ = gait(legs, state)
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
 
 
-def test_hand_written_kneed_walker_has_the_same_gait():
+def test_hand_written_kneed_model_has_the_same_gait_as_the_walker_in_the_package():
     legs, state = next(walkers(1, mistaken_knees.random_knees, mistaken_knees.config_of))
     found, _ = gait(legs, state, mistaken_knees.step)
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
@@ -62,7 +62,7 @@ def test_mistake_planted_into_a_walker_with_knees_is_named(words, digits):
 
 
 @pytest.mark.parametrize("digits", [3, 6, 12])
-def test_right_gait_is_reproduced_without_an_explanation(digits):
+def test_correct_gait_is_reproduced_and_needs_no_explanation(digits):
     for legs, state in islice(walkers(digits), 2):
         answer = answer_to(config_of(legs), *gait(legs, state), digits)
         assert (answer["finding"], answer["explanations"]) == ("reproduced", [])
@@ -87,7 +87,7 @@ def test_conventions_that_differ_in_several_ways_are_found(walker, changes):
     assert {each["kind"] for each in answer["explanations"]} == {"convention"}
 
 
-def test_mistake_is_named_in_the_convention_that_puts_both_feet_on_the_slope():
+def test_mistake_is_named_together_with_the_unstated_conventions():
     """The state is printed from the slope's normal and with the legs exchanged, and the config states neither."""
     words = "the legs' inertia is left out"
     legs, ((swing, stance, dswing, dstance), period) = first_gait_with(MISTAKES[words], walkers(7))
@@ -98,7 +98,7 @@ def test_mistake_is_named_in_the_convention_that_puts_both_feet_on_the_slope():
     assert cause == f"{conventions}, and {words}"
 
 
-def test_damaged_files_are_refused_or_answered(tmp_path):
+def test_check_of_a_damaged_file_gives_an_answer_or_a_clean_error(tmp_path):
     generator = random.Random(5)
     for number in range(8):
         file = tmp_path / f"odd-{number}.yaml"

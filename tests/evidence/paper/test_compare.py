@@ -261,7 +261,7 @@ def stored(tmp_path_factory):
     return execute(loaded.config, "compare", folder)
 
 
-def test_scene_of_the_paper_has_no_departures(stored):
+def test_scene_of_the_paper_config_does_not_differ_from_the_papers_own_scene(stored):
     assert stored.summary["departures"] == []
     assert [entry for entry in stored.left_out if not entry.saves] == []
     assert stored.summary["verdicts"] == {

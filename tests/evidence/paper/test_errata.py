@@ -65,7 +65,7 @@ def test_only_the_printed_sign_of_equation_a_5_gives_x_p():
     assert distance(study.corrected.state) > 10.0
 
 
-def test_corrected_equation_a_57_equals_the_impact_in_use():
+def test_corrected_equation_a_57_gives_the_same_velocities_as_the_impact_in_the_code():
     walker = walker_of_the_paper(CORRECTED)
     after = velocities_after_impact(walker, BEFORE, RIGHT)
     theta_1, theta_2, omega_1, omega_2 = impact(walker, *BEFORE)
@@ -104,7 +104,7 @@ def test_fixed_point_with_both_misprints_agrees_with_an_independent_program():
     assert_allclose(step(walker, state, MISPRINTED), state, atol=1e-6)
 
 
-def test_impact_inertia_matrix_gives_the_kinetic_energy_only_with_the_angles_first(study):
+def test_impact_inertia_matrix_gives_the_kinetic_energy_only_if_angles_precede_the_foot(study):
     walker, rates = walker_of_the_paper(CORRECTED), np.array([-0.6, -0.84, 0.3, -0.2])
     q, h = np.array([-0.2022, 0.1674]), 1e-6
     ahead = numpy_walker.positions(q + h * rates[:2], h * rates[2:])[:3]
@@ -118,7 +118,7 @@ def test_impact_inertia_matrix_gives_the_kinetic_energy_only_with_the_angles_fir
     assert study.kinetic_energy["foot_first"] != pytest.approx(study.kinetic_energy["masses"], rel=0.05)
 
 
-def test_energy_of_the_adams_start_is_that_of_its_masses(study):
+def test_energy_of_the_adams_start_equals_the_sum_over_its_point_masses(study):
     start = [row.adams.value for row in TABLE_2]
     assert study.adams.energy == pytest.approx(numpy_walker.energy(start), rel=1e-8)
     assert study.adams.energy > 1.4 * 150.14

@@ -101,7 +101,7 @@ def test_table_3_of_a_limping_walk_uses_the_last_complete_stride():
     assert table.v_com == pytest.approx(0.7 / 1.5)
 
 
-def test_table_3_of_a_single_step_has_no_cycle():
+def test_single_step_has_no_cycle_values_for_table_3():
     assert characteristics([0.5], [0.1], None) == Characteristics(0.5, None, None, None, None)
     assert characteristics([], [], None) == Characteristics(None, None, None, None, None)
 
@@ -244,7 +244,7 @@ def test_cycle_that_is_the_sum_of_its_steps_is_not_contradicted(rows):
     assert rows()[T_CYCLE.matlab].verdict == Verdict.NOT_REPRODUCED
 
 
-def test_adams_start_is_an_input_if_the_contact_model_starts_there(rows):
+def test_printed_adams_values_count_as_inputs_if_the_contact_walk_starts_from_them(rows):
     found = rows(start=adams_start_as_printed())
     assert {found[row.adams].verdict for row in TABLE_2} == {Verdict.INPUT}
 
@@ -260,7 +260,7 @@ def test_matlab_energy_is_explained_and_adams_energy_is_not_reproduced(rows):
     assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
-def test_start_that_walks_does_not_explain_a_fall(rows):
+def test_fall_in_the_paper_is_not_reproduced_if_our_walk_from_its_start_goes_on(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.values["contact"]) == (Verdict.NOT_REPRODUCED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence
@@ -299,7 +299,7 @@ def test_in_other_scenes_only_internal_contradictions_count_against_the_paper(ro
     assert {found[entry].verdict for entry in OWN_CONTRADICTIONS} == {Verdict.CONTRADICTED}
 
 
-def test_small_model_errors_contradict_the_largest_printed_error(rows):
+def test_printed_largest_error_is_contradicted_if_the_models_differ_much_less(rows):
     small = WalkDifference(np.array([(9e-5, 1e-4)]), np.array([(1e-4, 1e-4)]))
     row = rows(errors={"raw": small, "aligned": small})[LARGEST_ERROR]
     assert (row.verdict, row.values["contact"]) == (Verdict.CONTRADICTED, 1e-4)

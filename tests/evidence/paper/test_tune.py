@@ -74,7 +74,7 @@ def test_start_of_the_paper_does_not_lead_to_walking_and_the_reason_is_stated():
     assert "221.5 J" in start["reason"]
 
 
-def test_both_outcomes_of_the_adams_start_name_model_and_ground():
+def test_reason_for_the_adams_start_describes_the_model_and_ground_of_each_outcome():
     start = small("paper").summary["paper_start"]
     rigid, contact = start["reason"].split("the contact model on ")
     assert "in the rigid model, whose stance foot is pinned to an even slope" in rigid
@@ -87,7 +87,7 @@ def test_both_outcomes_of_the_adams_start_name_model_and_ground():
     assert plane.summary["paper_start"]["outcome"] != "off-pad"
 
 
-def test_percentages_are_relative_to_both_starts():
+def test_change_of_the_start_is_given_as_a_percentage_of_each_start():
     row = small("paper").summary["table2"]["dtheta_2"]
     assert row["paper_percent_of_matlab"] == pytest.approx(100 * (3.20 - 0.84) / 0.84)
     assert row["paper_percent_of_adams"] == pytest.approx(100 * (3.20 - 0.84) / 3.20)
@@ -142,7 +142,7 @@ def test_page_says_that_no_start_leads_to_walking():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_at_the_step_length_of_a_missing_gait_give_no_answer():
+def test_pads_spaced_by_the_contact_gait_give_no_answer_if_there_is_no_such_gait():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 
@@ -169,7 +169,7 @@ def test_kneed_walker_needs_no_adjustment_on_plain_ground():
     assert down["beyond"] is not None
 
 
-def test_kneed_gait_loses_energy_to_ground_friction_and_knees():
+def test_losses_of_the_kneed_gait_add_up_to_the_height_it_loses():
     gait = kneed().summary["gait"]
     assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
     assert gait["lost_J"]["knee_strikes"] > 0.0
@@ -179,7 +179,7 @@ def test_kneed_gait_loses_energy_to_ground_friction_and_knees():
     assert step == pytest.approx(gait["period_s"], rel=0.01)
 
 
-def test_parts_about_the_paper_are_omitted_for_other_walkers_with_a_reason():
+def test_parts_about_the_paper_are_reported_as_omitted_for_other_walkers():
     content = kneed()
     assert set(content.summary["procedure"]) == {"released", "adjusted"}
     assert "paper_start" not in content.summary

@@ -82,7 +82,7 @@ def test_rigid_case_also_ends_at_its_budget():
     assert case.budget <= result.rhs_evaluations < needed
 
 
-def test_start_is_lowered_in_metres_for_any_leg_length():
+def test_start_is_lowered_by_metres_whatever_the_leg_length():
     short = Case(name="x", expected=("walked",), reason="x", config={"walker": {"leg_length_m": 1.0}}, lowered_m=-0.01)
     long = short.model_copy(update={"config": {"walker": {"leg_length_m": 10.0}}})
     for case in (short, long):

@@ -50,7 +50,7 @@ def whole(tmp_path_factory):
     return run(tmp_path_factory.mktemp("whole"))
 
 
-def test_walker_walks_in_the_map_cell_of_the_papers_ground():
+def test_walk_in_the_map_cell_with_the_ground_of_the_paper_completes_its_steps():
     outcome, steps, sharper, error, _ = stiction_cell(PAPER_STIFFNESS, 0.1)
     assert (outcome, steps, sharper) == (Outcome.WALKED, 4, Outcome.WALKED)
     assert 0.0 < error < 1e-6
@@ -69,7 +69,7 @@ def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():
     assert numbers[5] == ERROR_MISSING
 
 
-def test_cells_whose_runs_end_differently_have_no_error():
+def test_error_is_missing_for_cells_whose_runs_end_differently():
     """This includes runs that end in the same way after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
     rows = (

@@ -30,7 +30,7 @@ def test_walk_without_steps_is_not_compared_with_ordinary_methods():
         assert choices(case, config_of(case)) == ()
 
 
-def test_reference_is_accurate_at_any_tolerance_of_the_case():
+def test_errors_of_ordinary_methods_do_not_depend_on_the_tolerance_of_the_case():
     loosest = next(case for case in package_cases() if case.name == "loosest")
     one, other = (choices(case, config_of(case)) for case in (PAPER, loosest))
     assert [choice.error for choice in one] == [choice.error for choice in other]
@@ -39,10 +39,10 @@ def test_reference_is_accurate_at_any_tolerance_of_the_case():
 @pytest.mark.parametrize(
     ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
 )
-def test_verdict_on_an_end_state_follows_its_error(off, verdict):
+def test_verdict_on_an_end_state_depends_on_the_size_of_its_error(off, verdict):
     assert ARRIVAL.judge_end("m", np.full(8, off), 1, 0.0).verdict == verdict
 
 
-def test_unfinished_run_has_no_error():
+def test_method_that_gives_up_has_no_error_value():
     choice = ARRIVAL.judge_end("m", None, MAX_ORDINARY_EVALUATIONS, 0.0)
     assert (choice.verdict, choice.error) == ("gives up", None)

@@ -147,7 +147,7 @@ def test_every_scene_uses_the_same_problems_with_known_answers():
     assert slices == [{}, {}]
 
 
-def test_verification_reads_the_scene_unless_the_walker_is_that_of_the_paper():
+def test_verification_ignores_the_scene_if_it_has_the_walker_of_the_paper():
     stage = PIPELINE["stability"]
     steep, paper = (Keys().identity(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
     assert steep == paper

@@ -97,7 +97,7 @@ def test_whitening_makes_values_independent(data, roughness):
     assert root @ covariance(data, noise) @ root.T == pytest.approx(np.eye(16), abs=1e-12)
 
 
-def test_noise_of_many_values_is_recovered():
+def test_noise_and_roughness_are_recovered_from_many_values():
     draw = np.random.default_rng(5)
     quantity = np.repeat([0, 1], 4000)
     J, G = draw.normal(size=(8000, 2)), draw.normal(size=(8000, 60))

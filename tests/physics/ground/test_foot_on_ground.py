@@ -89,7 +89,7 @@ def test_momentum_changes_by_the_contact_force(theta, omega, slip, vertical_velo
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
 @example(theta=(0.6875, 0.0), omega=(0.0, 2.0**-7), slip=0.0, vertical_velocity=0.0, depth=2.0**-7, foot=0)
-def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, vertical_velocity, depth, foot):
+def test_power_is_balanced_and_the_ground_only_dissipates(theta, omega, slip, vertical_velocity, depth, foot):
     """Along the motion, the energy falls at the rate at which damping and friction take it."""
     walker = ground.compass(normal=SOFT)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))

@@ -25,7 +25,7 @@ def pinned(radius=0.001, inertia=0.0, foot=1, has_ground=False):
 
 
 @given(state=states, radius=radii, inertia=inertias)
-def test_pinned_walker_is_the_rigid_swing_with_a_leg_shorter_by_the_radius(state, radius, inertia):
+def test_pinned_walker_swings_like_a_rigid_one_with_legs_shorter_by_the_foot_radius(state, radius, inertia):
     """The hinge is the centre of the ball, which is L - r from the hip and a - r from the mass of the leg."""
     rigid = RigidWalker(1.0 - radius, 0.5 - radius, 5.0, 10.0, inertia, ground.GRAVITY, ground.SLOPE, CORRECTED)
     found = rate_of(pinned(radius, inertia), state)

@@ -58,7 +58,7 @@ def test_pads_of_each_leg_are_centred_on_its_footholds(pitch, j):
 
 @pytest.mark.parametrize("has_ground", [False, True])
 @pytest.mark.parametrize("ahead", [False, True])
-def test_ground_under_a_foot_over_pads_does_not_depend_on_the_order_of_the_feet(has_ground, ahead):
+def test_on_pads_a_foot_keeps_or_lacks_ground_whichever_foot_is_ahead(has_ground, ahead):
     terrain = walked_on(0.4)
     for stands in (True, False):
         assert has_ground_in_air(terrain, has_ground, stands, ahead) == has_ground

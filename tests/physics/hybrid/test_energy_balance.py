@@ -75,7 +75,7 @@ def test_searches_and_maps_ignore_walks_with_unbalanced_energy(nothing_explained
     assert find_gait_from(scene.walker, ground, settings(), start).gait is None
 
 
-def test_benchmark_judges_methods_by_their_errors_alone(nothing_explained):
+def test_benchmark_does_not_reject_a_walk_for_its_energy_residual(nothing_explained):
     scene = scene_of()
     ground, start = scene.ground, start_state(scene, FIXED_POINT)
     trial = ContactTrial(scene.walker, ground, start, 1, "contact")

@@ -208,7 +208,7 @@ def test_scipy_method_gives_the_same_kneed_contact_walk():
     assert walk.energy_balance_residual_J < 1e-4 * exchanged(walk)
 
 
-def test_stiff_knee_stop_walks_like_the_ideal_lock():
+def test_walk_with_a_stiffer_knee_stop_is_closer_to_that_with_an_ideal_lock():
     ideal = walked(steps=3)
     stopped = [walked(steps=3, rules=KneeRules(Impact(k, 1.0, 1e-3 * k, 1e-5))) for k in (1e3, 1e5)]
     for walk in stopped:

@@ -94,14 +94,14 @@ def test_walk_on_ground_that_carries_after_mid_swing_agrees_with_the_reference(s
 
 
 @pytest.mark.parametrize("sets", [(), ("contact.stiction_velocity=1", "contact.friction_velocity=10")])
-def test_walk_without_scuffs_is_the_same_on_both_grounds(sets):
+def test_walk_without_scuffs_is_the_same_on_pads_and_on_a_plane(sets):
     pads, plane = walked(*sets, steps=6), walked(*sets, AFTER_MID_SWING, steps=6)
     np.testing.assert_allclose(plane.touch_time_s, pads.touch_time_s, atol=1e-8)
     np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-8)
     np.testing.assert_allclose(plane.rolling_m, pads.rolling_m, atol=1e-8)
 
 
-def test_slips_are_equal_on_both_grounds_if_the_law_switches_at_lift():
+def test_slip_is_the_same_on_pads_and_plane_if_the_friction_law_switches_at_lift():
     pads, plane = from_the_gait(*SWITCHING), from_the_gait(*SWITCHING, AFTER_MID_SWING)
     np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-7)
 
@@ -118,7 +118,7 @@ def test_lift_at_the_instant_of_zero_force_is_detected_at_once():
 
 @pytest.mark.parametrize("method", ["radau5", "dop853"])
 @pytest.mark.parametrize("name", BOUNCING_FEET)
-def test_bouncing_feet_do_not_stick_at_zero_force(name, method):
+def test_solver_does_not_stall_when_bouncing_feet_reach_zero_force(name, method):
     base, sets, expected = BOUNCING_FEET[name]
     for tolerance in (1e-6, 1e-9):
         walk = from_the_gait(*sets, steps=6, base=base, tolerance=tolerance, method=method)

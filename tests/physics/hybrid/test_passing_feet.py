@@ -49,14 +49,14 @@ class Feet:
 
 
 @pytest.mark.parametrize("carried", [False, True])
-def test_foot_in_the_air_is_supported_only_while_it_is_ahead(carried):
+def test_foot_that_passes_in_the_air_has_ground_afterwards_only_if_it_is_ahead(carried):
     assert Feet("after-mid-swing", AIR).passing(FORWARD, carried).carried
     assert not Feet("after-mid-swing", AIR).passing(BACK, carried).carried
 
 
 @pytest.mark.parametrize("forward", [FORWARD, BACK])
 @pytest.mark.parametrize("carried", [False, True])
-def test_passing_below_the_surface_changes_the_support_only_when_the_foot_lifts(forward, carried):
+def test_foot_that_passes_below_the_surface_changes_support_only_when_it_lifts(forward, carried):
     feet = Feet("after-mid-swing", GROUND).passing(forward, carried)
     assert feet.carried == carried
     assert feet.lifting().carried == forward

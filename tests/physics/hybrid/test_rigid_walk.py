@@ -123,7 +123,7 @@ def test_energy_is_constant_within_a_swing():
     assert walk.energy_drift <= 1e-11 * walk.mean_energy
 
 
-def test_energy_drifts_within_a_swing_of_the_printed_equations():
+def test_energy_drifts_within_a_swing_if_the_equations_are_used_as_printed():
     walk = walked(PAPER._replace(c21_sign=AS_PRINTED), start_of(PAPER), 10, 1e-12)
     assert walk.energy_drift == pytest.approx(0.13, abs=0.01)
 
@@ -162,7 +162,7 @@ def test_scuff_depth_is_reported(degrees, millimetres):
     assert 1e3 * gait.max_scuff_depth == pytest.approx(millimetres, rel=0.02)
 
 
-def test_quantities_along_a_walk_equal_those_of_each_state():
+def test_energies_and_forces_of_many_states_equal_those_of_each_state():
     states = np.array([GAIT, (0.1, -0.2, 0.3, -0.4)])
     for state, energy, force in zip(states, energies(PAPER, states), reactions(PAPER, states), strict=True):
         parts = kinetic_energy(PAPER, *state), potential_energy(PAPER, *state[:2])

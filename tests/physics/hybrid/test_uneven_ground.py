@@ -161,7 +161,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_contact_walk_over_heights_balances_energy_and_stays_near_the_rigid_one(case):
+def test_contact_walk_on_uneven_ground_balances_energy_and_stays_near_the_rigid_walk(case):
     name, terrain = CASES[case]
     _, walker, gait = gait_of(name)
     heights = heights_of(walker, 2, 6)
@@ -181,7 +181,7 @@ def test_contact_walk_over_heights_balances_energy_and_stays_near_the_rigid_one(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_contact_walk_over_heights_of_zero_equals_even_ground_bit_for_bit(case):
+def test_contact_walk_over_footholds_of_zero_height_equals_that_on_even_ground(case):
     name, terrain = CASES[case]
     _, even = on_terrain(name, terrain, None, steps=3)
     _, level = on_terrain(name, terrain, np.zeros(1), steps=3)
@@ -212,7 +212,7 @@ def test_foot_below_its_next_foothold_at_mid_swing_stubs_on_plain_ground():
     assert (walk.outcome, walk.steps) == (Outcome.STUBBED, 1)
 
 
-def test_hitting_the_side_of_a_raised_pad_counts_as_off_pad():
+def test_hitting_the_side_of_a_raised_pad_ends_the_walk():
     _, walk = on_terrain("slope-3deg", "checkerboard", np.array([0.0, 0.0, 0.2]))
     assert walk.outcome in (Outcome.OFF_PAD, Outcome.FELL)
     assert walk.steps == 1
@@ -306,7 +306,7 @@ def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
 
 
 @pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
-def test_foot_that_passes_again_below_the_ground_is_supported_as_on_even_ground(terrain):
+def test_foot_that_goes_below_the_ground_again_is_supported_as_on_even_ground(terrain):
     """All footholds are level but one, which is never reached."""
     sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
     heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
@@ -316,7 +316,7 @@ def test_foot_that_passes_again_below_the_ground_is_supported_as_on_even_ground(
     assert uneven.end_time_s == pytest.approx(even.end_time_s, abs=1e-9)
 
 
-def test_loss_of_contact_is_located_at_every_tight_tolerance():
+def test_loss_of_contact_is_found_at_the_same_time_for_all_tight_tolerances():
     heights = np.array([0.0, 5.5611e-05, -0.00097804, 0.00096203])
     walks = (
         walk_from(LETS_GO_LATE, LETS_GO_LATE_FROM, 3, heights, Tolerances("radau5", 1e-11, atol, 10**7))

@@ -142,7 +142,7 @@ def test_energy_and_angular_momentum_are_constant_in_flight(measured, theta, ome
 
 
 @given(theta=angles)
-def test_levers_lead_from_any_root_to_any_point(theta):
+def test_levers_add_up_to_the_vector_from_any_root_to_any_point(theta):
     """A point is root + sum of R(theta_k) d_k, from whichever end of the chain the sum starts."""
     s, c = np.sin(theta), np.cos(theta)
     foot, head, toe = kneed.STANCE_POINT, Anchor("torso", (0.1, 0.7)), Anchor("shank", (0.0, -0.48))
@@ -200,5 +200,5 @@ def test_walker_without_two_feet_is_rejected():
         contact_walker(one_legged, Impact(1.0, 1.0, 0.0, 1.0), Frictionless(), 9.81, 0.0)
 
 
-def test_foot_of_zero_length_has_no_lever_at_the_root():
+def test_levers_from_the_root_to_itself_are_zero():
     assert not levers(kneed.KNEED, kneed.STANCE_POINT, kneed.STANCE_POINT).any()

@@ -297,7 +297,7 @@ def by_parts(assembly, radius_m, leg_length_m):
 
 
 @for_each_type
-def test_walker_built_from_parts_equals_that_of_its_type(assembly, slope, free):
+def test_walker_listed_as_parts_moves_like_the_same_walker_given_by_its_type(assembly, slope, free):
     model = rigid_on_slope(assembly, G, slope)
     # Equal bodies of both legs are shifted equally.
     shifts = dict(

@@ -175,7 +175,7 @@ def angular_momentum(parts, spins, about):
 
 
 @given(st.tuples(angle, rate, rate))
-def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
+def test_heel_strike_conserves_angular_momenta_about_the_new_contact_and_the_hip(numbers):
     """Conserved are the angular momentum of the whole walker about the new contact point, and that of the trailing leg
     plus half of the torso's about the hip.
     """
@@ -198,7 +198,7 @@ def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
 
 
 @given(free)
-def test_knee_strike_conserves_the_other_momenta_and_loses_energy(numbers):
+def test_knee_strike_conserves_the_momenta_of_the_stance_leg_and_the_straightened_leg(numbers):
     """Conserved are the generalised momenta of Lagrange's equations for the stance leg, and for thigh and shank
     together.
     """

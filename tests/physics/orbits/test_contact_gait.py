@@ -51,7 +51,7 @@ def test_long_walk_on_matching_pads_settles_on_the_gait(gait):
     assert walk.slip_m[-2] == pytest.approx(gait.step.slip_m, abs=1e-7)
 
 
-def test_multipliers_give_the_rate_of_approach_of_a_long_walk(gait):
+def test_contact_gait_is_stable_with_a_largest_multiplier_of_0_54(gait):
     assert gait.stable
     assert abs(gait.multipliers[0]) == pytest.approx(0.54, abs=0.01)
     # Three disturbances vanish within one step, because the stance foot holds height and angle.

@@ -240,7 +240,7 @@ def test_cost_derivative_across_a_knee_strike_equals_a_difference_quotient():
 HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
 
 
-def test_contact_step_derivative_includes_the_change_of_driven_leg():
+def test_contact_step_derivative_includes_the_switch_of_the_driven_leg_at_touch():
     """At a touch the torque moves from one leg to the other. If the derivative ignored this, the third digit would be
     wrong.
     """

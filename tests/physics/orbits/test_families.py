@@ -251,7 +251,7 @@ def test_every_point_of_a_branch_has_its_minimal_period():
             assert all(np.max(np.abs(step.z - point.z)) > 1e-6 for step in cycle.steps[:-1])
 
 
-def test_stability_changes_only_at_bifurcations_and_branches_end_at_the_span():
+def test_stability_changes_only_at_bifurcations_and_the_branch_spans_the_whole_range():
     branches = compass_family()
     flips = flips_of(branches)
     stable = next(b for b in branches if b.period == 1 and b.stable_ranges)
@@ -291,7 +291,7 @@ def test_gait_just_beyond_a_flip_is_on_the_doubled_branch():
     assert follower.family([seed], 2, known) == known
 
 
-def test_branch_followed_from_its_middle_begins_at_its_flip_without_gaits_of_half_its_period():
+def test_branch_followed_from_its_middle_reaches_its_flip_and_has_no_gaits_of_half_the_period():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.07, 0.08))
     one, doubled = follower.family([seeds_at(paper_walker, 0.072)[-1]], 2)
     (flip,) = (each for each in one.bifurcations if each.kind == "flip")

@@ -85,7 +85,7 @@ def test_exchanged_labels_give_the_same_gait_half_a_stride_later(kind):
 
 
 @pytest.mark.parametrize("kind", ["round", "kneed and round"])
-def test_walker_with_a_second_equal_leg_has_the_same_gait_and_squared_multipliers(kind):
+def test_pair_of_equal_legs_has_the_gait_of_the_symmetric_model_and_its_squared_multipliers(kind):
     plain = draw_walker(kind, 4)
     walker = model_of(replace(plain, legs=(plain.legs[0],) * 2))
     equal = best(walker)

@@ -60,7 +60,7 @@ def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
 
 
 @pytest.mark.parametrize("name", [ALL_SERIES, STICTION_SERIES])
-def test_first_setting_of_a_stiffness_series_is_the_config(name):
+def test_first_setting_of_a_stiffness_series_leaves_the_walker_unchanged(name):
     walker = contact_scene(load().config, 0.37).walker
     assert scale_laws(walker, *series_settings(name)[0][2:]) == walker
 

@@ -102,7 +102,7 @@ def test_sensitivity_norm_on_compliant_ground_equals_a_brute_force_sum(name, dis
     assert (answer.error < 1e-5 * answer.norm).all()
 
 
-def test_lyapunov_equation_gives_the_norm_of_stable_gaits_only():
+def test_sensitivity_norm_equals_the_summed_response_and_is_absent_if_unstable():
     generator = np.random.default_rng(3)
     for d in (1, 3, 5):
         A = generator.normal(size=(d, d))
@@ -314,7 +314,7 @@ def test_difference_quotient_has_order_four_and_is_one_sided_at_a_bound():
     assert derivative(lambda x: None, 1e-2) is None
 
 
-def test_failed_walk_has_fewer_steps_and_an_outcome():
+def test_failed_walk_ends_early_and_is_reported_as_a_fall():
     at = standpoint("slope-3deg")
     walk = walk_disturbed(at, "floor-drop", 0.2, 3)
     assert walk.outcome is Outcome.FELL

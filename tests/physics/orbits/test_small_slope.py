@@ -40,7 +40,7 @@ def test_simplest_walker_has_the_published_short_period():
     assert short.period == pytest.approx(np.pi, abs=1e-6)
 
 
-def test_long_period_of_massless_legs_solves_the_equation_for_massless_legs():
+def test_half_of_the_long_period_of_massless_legs_solves_tan_h_equals_minus_3_tanh_h():
     # A swing leg without mass is a driven pendulum, for which tan h = -3 tanh h.
     half = symmetric_half_period(linear_modes(SIMPLEST))
     assert np.tan(half) == pytest.approx(-3.0 * np.tanh(half), rel=1e-6)

@@ -131,11 +131,11 @@ def test_every_crossing_is_found_in_order(thousandths, sign, direction):
 
 
 @pytest.mark.parametrize("left", [0.0, 1e-13, -1e-13])
-def test_event_function_leaves_its_zero_in_the_right_direction_despite_a_small_offset(left):
+def test_direction_of_an_event_function_after_its_zero_is_found_despite_a_small_offset(left):
     falls_then_rises = left + Polynomial([0.0, -1e-6, 1e-2])
     assert way_from_zero(finder_on(falls_then_rises), 0, 1e-12) == pytest.approx(-1e-6, rel=1e-5)
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
 
 
-def test_event_function_that_is_zero_to_rounding_leaves_zero_in_no_direction():
+def test_change_within_rounding_gives_no_direction_away_from_zero():
     assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

@@ -260,7 +260,7 @@ def test_run_ends_when_its_budget_is_spent(name):
 
 
 @every_method
-def test_counts_are_integers_for_any_budget(name):
+def test_counts_are_integers_even_if_the_budget_is_a_float(name):
     assert method_named(name).new(4, 1e-6, 1e-8, 1e4).counts.dtype == np.int64
 
 

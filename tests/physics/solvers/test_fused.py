@@ -24,7 +24,7 @@ def test_compiled_fused_multiply_add_rounds_once(a, b, c):
 
 
 @given(numbers, numbers, numbers)
-def test_python_fallback_agrees_to_rounding(a, b, c):
+def test_fused_multiply_add_in_python_agrees_with_compiled_code_to_rounding(a, b, c):
     assert abs(fused(a, b, c) - compiled(a, b, c)) <= 2.0 * np.finfo(float).eps * (abs(a * b) + abs(c)) + 1e-300
 
 

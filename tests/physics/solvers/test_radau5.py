@@ -142,7 +142,7 @@ def curve_errors(pull):
     return [np.abs(fixed_steps(system, (0.0, 1.0), 1.5, h, 1.0).y - exact).max() for h in lengths]
 
 
-def test_method_has_order_five_on_a_curve_that_attracts_mildly():
+def test_method_has_order_five_on_a_mildly_attracting_curve():
     assert orders(curve_errors(-1.0)) == pytest.approx(5.0, abs=0.3)
 
 

@@ -57,7 +57,7 @@ def test_stiff_methods_come_from_more_than_one_library():
 
 @each_problem
 @each_method
-def test_stiff_method_ends_as_published_in_few_steps(name, problem):
+def test_stiff_method_reaches_the_published_end_state_in_few_steps(name, problem):
     """A step's error is at most the tolerance and dies on the way; multistep methods add up a few dozen of them.
 
     An explicit method is bound to steps of about 2 / |eigenvalue|: a million for van der Pol's.

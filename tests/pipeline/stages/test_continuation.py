@@ -101,7 +101,7 @@ def test_number_of_recomputed_gaits_is_reported(in_degrees):
     assert error["by"] == "ten times tighter tolerances"
 
 
-def test_families_without_error_estimate_are_otherwise_equal():
+def test_omitting_the_error_estimate_changes_nothing_else_in_the_families():
     asked = config("over=slope_deg", "from=1", "to=1.5", "periods=1")
     memory = MemoryResults()
     looked_at, whole = (answer_in_memory(asked, "continuation", memory, again=again) for again in (False, True))
@@ -139,7 +139,7 @@ def test_branch_that_ends_because_the_foot_slides_says_what_to_change():
 
 
 @pytest.mark.parametrize(("tripped", "side"), [((0.0, 1.0), "Above"), ((1.0, 0.0), "Below")])
-def test_report_says_that_pads_end_the_walks_there_but_not_the_gait(tripped, side):
+def test_report_says_that_pads_end_the_walks_although_the_gait_continues(tripped, side):
     monitor = SimpleNamespace(name="tripped", limit=0.5)
     points = [SimpleNamespace(value=value, monitors=[one]) for value, one in zip((4.0, 4.2), tripped, strict=True)]
     crossing = SimpleNamespace(monitor=monitor, value=4.1)
@@ -192,7 +192,7 @@ def test_stored_doubled_branch_begins_at_the_flip_of_its_parent(in_degrees):
     assert np.ptp(group["mark_step_period"][0]) == 0.0
 
 
-def test_doubled_branch_shows_the_gait_at_its_flip_starting_from_its_own_first_step():
+def test_gait_at_a_flip_is_shown_from_the_first_step_of_the_doubled_branch():
     gait = SimpleNamespace(periods_s=np.array([0.5, 0.6, 0.7]), angles=np.array([0.1, 0.2, 0.3]))
     flip = SimpleNamespace(kind="flip", value=6.0, gait=gait)
     parent = SimpleNamespace(period=3, bifurcations=(flip,))
@@ -253,7 +253,7 @@ def test_values_derived_from_a_key_change_with_it():
         ("walker.hip_mass_kg", {"rigid", "contact"}),
     ],
 )
-def test_key_affects_only_models_that_depend_on_it(over, models):
+def test_rigid_and_contact_models_are_each_affected_by_the_expected_keys(over, models):
     own = config()
     parameter = parameter_of(over, own)
     span = ValueSpan(*(factor * parameter.value_in(own) for factor in (1.0, 1.1)))

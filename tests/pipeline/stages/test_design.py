@@ -61,7 +61,7 @@ def test_optimum_equals_that_of_a_grid_search():
     )
 
 
-def test_design_search_uses_the_gait_at_its_own_parameters():
+def test_design_search_finds_the_gait_at_the_parameters_it_tries():
     """From the gait with a hip of 10 kg, Newton's method would find an unstable gait of the walker of 50 kg, with
     multiplier 4.55.
     """
@@ -253,7 +253,7 @@ def test_design_of_the_mass_of_one_leg_can_start_from_equal_legs():
     assert found["value"] == pytest.approx(gait_at("slope-3deg", f"{key}={best!r}").period, rel=1e-8)
 
 
-def test_largest_step_of_a_limping_walker_is_that_of_its_weaker_leg():
+def test_largest_step_down_that_a_limping_walker_survives_is_that_of_its_weaker_leg():
     over = "design.over={walker.leg_2.leg_mass_kg: [4.95, 5.05]}"
     found = run("prosthesis", "design.maximise=largest_step_down_m", over, "robustness.steps=3", "design.starts=1")
     best = f"walker.leg_2.leg_mass_kg={found['best']['walker.leg_2.leg_mass_kg']!r}"

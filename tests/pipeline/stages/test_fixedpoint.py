@@ -117,7 +117,7 @@ def test_failure_advises_a_slope_with_a_gait():
     assert "slope_deg=" not in quick.value.advice
 
 
-def test_drive_without_a_gait_is_named_as_the_cause():
+def test_advice_blames_the_drive_if_a_driven_walker_has_no_gait():
     driven = Config.model_validate({"slope_rad": 0.0, "push_off": {"impulse_N_s": 60.0}})
     assert "too strong or too weak on this slope: try another push_off.impulse_N_s" in fixedpoint.advice(driven)
     sprung = Config.model_validate({"slope_rad": 0.0, "walker": {"hip": {"spring_N_m_per_rad": 5.0}}})

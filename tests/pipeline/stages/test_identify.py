@@ -141,7 +141,7 @@ def test_known_leg_mass_determines_the_hip_mass(table, gait):
     assert rows["walker.hip_mass_kg"]["standard_error"] == pytest.approx(0.1, rel=0.1)
 
 
-def test_millimetres_read_as_metres_are_a_misfit(table, gait, tmp_path):
+def test_fit_to_millimetres_read_as_metres_is_reported_as_a_misfit(table, gait, tmp_path):
     rows = np.loadtxt(table, delimiter=",", skiprows=1) * (1.0, 1e3)
     path = tmp_path / "mm.csv"
     path.write_text("period_s,length_m\n" + "\n".join(f"{p},{q}" for p, q in rows))
@@ -242,7 +242,7 @@ def test_malformed_option_is_rejected(options, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("data", DAMAGED_FILES, ids=repr)
-def test_damaged_file_is_rejected_by_name(data, tmp_path, monkeypatch):
+def test_error_names_the_damaged_file(data, tmp_path, monkeypatch):
     (tmp_path / "steps.csv").write_bytes(data)
     assert "steps.csv" in refused(tmp_path, monkeypatch, "--data", "steps.csv", *FIT)
 
@@ -406,7 +406,7 @@ def test_prior_that_the_walk_contradicts_is_named(table, gait):
     assert "The walk contradicts the prior of the leg length, 1.100 ± 0.010 m, by " in text
 
 
-def test_measured_and_identified_motion_follow_the_walk(from_angles, transient):
+def test_measured_and_identified_motions_agree_with_the_simulated_walk(from_angles, transient):
     walk = transient.groups["trajectory"]
     for name in ("identified_motion", "measured_motion"):
         motion = from_angles.groups[name]

@@ -47,7 +47,7 @@ def test_error_estimate_agrees_with_a_walk_at_much_tighter_tolerances(stage, mod
         assert right["numerical_error"][key] < 1e-3 * true
 
 
-def test_error_estimate_of_a_hip_torque_cost_agrees_with_a_far_tighter_walk():
+def test_error_estimate_of_a_hip_torque_cost_agrees_with_far_tighter_tolerances():
     driven = ("walker.hip.torque_N_m=0.3", "outputs=[]", "strides=2")
     loose = walk("simulate", "solver.rigid.rtol=1e-4", "solver.rigid.atol=1e-6", *driven)
     right = walk("simulate", "solver.rigid.rtol=1e-10", "solver.rigid.atol=1e-12", *driven)
@@ -68,7 +68,7 @@ def test_second_walk_falls_back_to_a_smaller_factor_or_another_method():
     assert tightened(Tolerances("radau5", MIN_RTOL, 1e-12, 1))[0].method == "dop853"
 
 
-def test_second_walk_with_a_smaller_than_usual_tightening_is_reported():
+def test_numerical_error_says_if_the_tolerances_were_tightened_less_than_usual():
     error = walk("simulate", "solver.rigid.rtol=1e-13", "solver.rigid.atol=1e-15", "outputs=[]")["numerical_error"]
     assert error["by"] == "ten times tighter tolerances"
     assert error["step_period_s"] < 1e-12
@@ -91,7 +91,7 @@ def test_second_walk_with_another_outcome_gives_a_reason_instead_of_an_error():
     assert list(change(WALKED, WALKED | {"steps": 1}, by="another method, radau5")) == ["reason"]
 
 
-def test_error_is_the_largest_change_anywhere():
+def test_numerical_error_is_the_largest_change_over_all_steps():
     again = WALKED | {"step_periods_s": [0.7, 0.75], "step_lengths_m": [0.2, 0.3], "end_time_s": 1.45}
     expected = {"step_period_s": 0.05, "step_length_m": 0.1, "end_time_s": 0.05}
     found = change(WALKED, again)
@@ -115,7 +115,7 @@ def test_steps_of_a_cycle_are_matched_before_comparison():
 
 
 @pytest.mark.parametrize("stage", MODULES)
-def test_walk_without_a_step_has_only_an_end_error(stage):
+def test_walk_without_a_step_has_a_numerical_error_only_for_its_end_time(stage):
     fallen = walk(stage, "start=[-0.1674, 0.1674, -0.4, -0.5]", "slope_rad=0", "contact.pad_pitch=0.3", "outputs=[]")
     assert fallen["outcome"] in ("fell", "off-pad")
     assert fallen["steps"] == 0

@@ -207,7 +207,7 @@ def test_missing_rows_are_an_error_with_their_position(tmp_path, begin, end, why
     assert "8 samples per step" in refusal.value.advice
 
 
-def test_gap_of_a_few_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
+def test_short_gap_and_a_jump_in_the_last_time_stamp_are_harmless(tmp_path):
     head, *rows = table(simulated("rigid")).splitlines()
     kept = [row for row in rows if not 1.0 < float(row.split(",")[0]) < 1.05 and float(row.split(",")[0]) < 4.0]
     time, angles = kept[-1].split(",", 1)
@@ -451,7 +451,7 @@ LIMPING = {
 
 @pytest.mark.parametrize("begins", ["at the first step", "in the first step"])
 @pytest.mark.parametrize("name", LIMPING)
-def test_recording_of_a_simulated_limp_has_its_steps_and_begins_with_leg_1(name, begins, tmp_path):
+def test_steps_of_a_simulated_limp_are_recovered_from_its_recording_starting_with_leg_1(name, begins, tmp_path):
     own, *sets = LIMPING[name]
     config = load(Path(own), (*sets, "strides=4")).config
     walk = run_in_memory("simulate", config)

@@ -153,7 +153,7 @@ def test_slope_without_a_gait_can_be_simulated_from_a_given_start():
     assert set(result.groups) == {"trajectory"}
 
 
-def test_lying_start_is_rejected():
+def test_start_with_the_walker_lying_down_is_rejected():
     result = run(start=(-1.5348, 1.5, 0.0, 0.0))
     assert result.summary["outcome"] == "rejected"
     assert set(result.groups) == set()
@@ -206,7 +206,7 @@ def test_exhausted_budget_gives_no_answer_but_keeps_the_partial_walk(monkeypatch
     assert caught.value.partial.summary["steps"] > 0
 
 
-def test_other_method_gives_the_same_steps(paper):
+def test_another_method_gives_the_same_final_state(paper):
     other = run(solver={"rigid": {"method": "scipy-dop853", "rtol": 1e-10, "atol": 1e-12}})
     assert other.summary["final_state"] == pytest.approx(paper.summary["final_state"], abs=1e-8)
 

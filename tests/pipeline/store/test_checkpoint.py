@@ -46,7 +46,7 @@ def test_malformed_checkpoint_line_is_dropped(path, forged):
     assert list(Checkpoint(path, "key").kept) == ["one", "two"]
 
 
-def test_checkpoint_of_another_key_stays_until_the_first_new_part(path):
+def test_checkpoint_of_another_key_stays_until_the_first_new_part_is_stored(path):
     before = path.read_bytes()
     checkpoint = Checkpoint(path, "other")
     assert checkpoint.kept == {}

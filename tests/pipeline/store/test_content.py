@@ -99,7 +99,7 @@ def test_unreadable_text_is_rejected(text):
         Group({}, {"note": text})
 
 
-def test_labels_must_fit_the_values():
+def test_names_of_dimensions_must_match_the_shapes_of_the_values():
     with pytest.raises(ValueError, match="dimensions"):
         Variable(np.zeros((2, 2)), ("x",), "m", "length")
     with pytest.raises(ValueError, match="dimensions"):

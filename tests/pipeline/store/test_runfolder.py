@@ -44,7 +44,7 @@ def test_run_folder_has_the_documented_layout(folder):
     assert not folder.path.exists()
 
 
-def test_locked_folder_is_an_error_without_waiting(folder, holder):
+def test_locked_folder_raises_an_error_at_once_if_waiting_is_off(folder, holder):
     with pytest.raises(LockedError) as caught, folder.locked(wait=False):
         pass
     assert caught.value.exit_code == 6

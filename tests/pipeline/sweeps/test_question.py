@@ -43,7 +43,7 @@ def test_unknown_quantity_is_rejected_before_anything_is_computed(option):
         refuse_unrecorded(slopes, {f"{option} froud": "froud"})
 
 
-def test_option_zip_pairs_values():
+def test_zip_option_pairs_values():
     pairs = question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10, 15]", zipped=True)
     assert [pairs.places(index) for index in range(len(pairs))] == [(0, 0), (1, 1), (2, 2)]
     assert pairs.dims == ("point",)

@@ -147,7 +147,7 @@ def test_nothing_is_computed_twice(toy, marks):
     assert marks() == 9
 
 
-def test_points_equal_for_the_stage_are_computed_once(toy, marks):
+def test_points_that_differ_only_in_parameters_the_stage_does_not_read_are_computed_once(toy, marks):
     notes = []
     reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
     swept = toy.run("drop", GRAVITIES, "strides=[2, 3, 4]", reporter=reporter)
@@ -173,7 +173,7 @@ def test_sweep_keys_equal_those_of_the_pipeline(toy):
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed"])
-def test_point_has_the_key_of_its_single_run(name, tmp_path):
+def test_sweep_point_has_the_same_key_as_a_single_run(name, tmp_path):
     loaded = load(Path(name))
     stages = [stage for stage in PIPELINE.stages if not stage.draws and stage.why_unsuited(loaded.config) is None]
     folder = RunFolder(tmp_path, loaded.run_name)
@@ -255,7 +255,7 @@ def test_only_stages_without_files_can_be_swept(toy):
         toy.sweep("picture", GRAVITIES)
 
 
-def test_parameters_of_listed_points_are_coordinates(toy):
+def test_parameters_of_sampled_points_are_stored_as_coordinates_along_the_points(toy):
     swept = toy.run("drop", "gravity_m_s2=1:9", "walker.hip_mass_kg=1:5", sample="latin-hypercube:6", seed=2)
     with opened(swept) as dataset:
         assert dataset.period_s.dims == ("point",)
@@ -295,7 +295,7 @@ def test_table_shows_headline_values_unless_all_are_requested(toy):
     assert short[0].keys() < whole[0].keys()
 
 
-def test_last_step_is_taken_from_each_walk():
+def test_last_step_of_each_walk_is_found_even_if_some_walks_end_earlier():
     last = last_numbers(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
     assert last[:2].tolist() == [0.8, 0.6]
     assert np.isnan(last[2])

@@ -279,7 +279,7 @@ class OneFate(WorkerPool):
                 future.set_result(compute(batch))
 
 
-def test_unit_next_to_a_fatal_one_gets_a_last_attempt_alone():
+def test_unit_lost_because_another_killed_the_worker_is_retried_alone():
     names, lost = [], []
     units = [WorkUnit(name, 1, int) for name in ("deadly", "beside")]
     with OneFate() as worker:

@@ -203,7 +203,7 @@ def test_flag_may_contain_a_hyphen():
     assert "--from-step" in done.output
 
 
-def test_option_that_runs_another_stage_needs_only_options_that_this_stage_has():
+def test_stage_that_an_option_redirects_to_has_every_option_that_requires_the_redirect():
     redirects = [(stage, option) for stage in PIPELINE.stages for option in stage.options if option.runs]
     assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
     for stage, option in redirects:

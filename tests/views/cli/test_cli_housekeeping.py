@@ -31,7 +31,7 @@ def test_status_distinguishes_missing_current_stale_damaged_and_omitted(toy):
     assert states(toy("status", "--json", "--config", "rigid-only"))["bounce"] == "left out"
 
 
-def test_status_shows_results_without_an_answer(toy):
+def test_status_marks_stages_that_found_no_answer(toy):
     steep = ("--set", "slope_rad=1.2")
     toy.alone("page", *steep)
     found = toy("status", "--check", "--json", *steep)

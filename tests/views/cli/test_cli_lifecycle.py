@@ -46,7 +46,7 @@ def test_init_explains_what_is_out_of_scope(walker):
 @pytest.mark.parametrize(
     ("walker_type", "config"), [("torso", "torso"), ("parts", "parts"), ("straight-legs", "round-feet")]
 )
-def test_init_writes_a_type_or_a_built_in_config_under_its_name(walker, walker_type, config):
+def test_init_with_a_type_writes_its_built_in_config_to_a_file_named_after_the_type(walker, walker_type, config):
     assert walker("init", "--type", walker_type).returncode == 0
     written = load(walker.folder / f"my-{walker_type}.yaml").config
     assert written.model_copy(update={"name": config}) == load(Path(config)).config
@@ -177,7 +177,7 @@ def test_missing_config_suggests_init(walker):
     assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to start from"
 
 
-def test_animate_of_a_missing_run_exits_3(walker):
+def test_animate_exits_3_if_the_run_is_missing(walker):
     done = walker("animate", "paper")
     assert done.returncode == 3
     assert "there is no run paper" in done.stderr

@@ -28,7 +28,7 @@ def test_companion_files_of_a_model_share_its_name(walker):
     assert "the script driven.py applies instead" in done.stderr
 
 
-def test_slope_in_the_geometry_is_stated_in_the_file(walker):
+def test_exported_model_says_that_its_ground_is_tilted(walker):
     assert walker("export", "paper", "model", "--to", "mjcf", "--slope", "geometry").returncode == 0
     text = (walker.folder / "paper.xml").read_text()
     assert "rad, as tilted ground." in text

@@ -250,7 +250,7 @@ def test_continuation_over_a_key_needs_its_span(walker):
         "design --minimise period_s --over contact.damping=1:2": "does not affect the rigid model",
     }.items(),
 )
-def test_invalid_question_stops_before_anything_runs(walker, asked, refused):
+def test_invalid_options_are_rejected_before_anything_runs(walker, asked, refused):
     done = walker(*asked.split(), "--json")
     assert done.returncode == 3
     assert refused in json.loads(done.stdout)["error"]["message"]

@@ -59,7 +59,7 @@ def test_dry_run_of_a_sweep_lists_points_and_changes_nothing(swept):
     assert sorted(toy.folder.rglob("*")) == before
 
 
-def test_bad_points_and_questions_exit_3_with_allowed_values(swept):
+def test_invalid_sweep_values_parameters_and_engines_exit_3(swept):
     toy, _ = swept
     done = toy(*SWEEP, "--over", "gravity_m_s2=[1, -2]")
     assert done.returncode == 3
@@ -69,7 +69,7 @@ def test_bad_points_and_questions_exit_3_with_allowed_values(swept):
     assert toy(*SWEEP, "--over", "gravity_m_s2=[1]", "--engine", "abacus").returncode == 3
 
 
-def test_unknown_quantity_to_show_ends_a_sweep_after_its_first_chunk(toy):
+def test_sweep_stops_after_its_first_chunk_if_show_names_an_unknown_quantity(toy):
     few = ("--jobs", "1", "--chunk-seconds", "1e-9")
     done = toy("sweep", "--over", "gravity_m_s2=1:9:400", "--stage", "drop", "--show", "nonsense", *few)
     assert done.returncode == 3
@@ -112,7 +112,7 @@ def test_diff_lists_differences_of_config_and_results(toy):
     assert "+41.4 %" in text
 
 
-def test_diff_labels_runs_of_equal_name_by_folder(toy):
+def test_diff_labels_runs_with_the_same_name_by_folder(toy):
     toy("roll", "--runs", "here")
     toy("roll", "--runs", "there", "--set", "gravity_m_s2=4.905", "--set", "name=paper")
     (there,) = (toy.folder / "there").iterdir()

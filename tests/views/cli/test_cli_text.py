@@ -15,7 +15,7 @@ from walkerlab.views.report.tables import LONGEST_CELL, describe_summary, record
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 
 
-def test_column_of_sentences_is_named_below_the_table():
+def test_omitted_column_of_sentences_is_mentioned_below_the_table():
     rows = [{"number": 2, "svg": "figures/figure-02.svg", "caption": SENTENCES}, {"svg": "own.svg", "caption": "-"}]
     lines = list(describe_summary({"figures": rows}))
     assert lines[1].split() == ["number", "svg"]

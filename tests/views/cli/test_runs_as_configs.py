@@ -224,7 +224,7 @@ def test_damaged_results_are_reported_once_with_the_command_to_recompute_them(to
     assert toy("diff", "paper", "paper@strides=7").returncode == 0
 
 
-def test_drawing_reports_omitted_damaged_results(toy):
+def test_page_reports_that_a_damaged_result_is_omitted(toy):
     toy.alone("survey", "--full")
     census = toy.folder / "runs/paper/census.h5"
     census.write_bytes(census.read_bytes()[:-1])
@@ -295,7 +295,7 @@ def test_status_lists_changes_that_a_short_name_omits(toy):
     assert json.loads(toy("status", named, "--json").stdout)["changes"] == LONG_AS_LISTED
 
 
-def test_run_with_a_long_name_of_an_older_version_keeps_it(toy):
+def test_run_keeps_the_long_name_that_an_older_version_gave_it(toy):
     old = "paper@walker.leg_mass_kg=6.25,gravity_m_s2=1.62,strides=9-cd9cca311320"
     made = run_dir(toy("drop", *LONG, "--json"))
     (toy.folder / made).rename(toy.folder / "runs" / old)

@@ -204,7 +204,7 @@ def test_clicking_a_gait_curve_sets_the_parameter(whole_page):
     )
 
 
-def test_ground_parameters_plot_contact_gaits_on_a_log_axis(whole_page):
+def test_contact_gaits_are_plotted_over_a_ground_parameter_on_a_log_axis(whole_page):
     page = whole_page
     typed(page, "contact.stiffness", "50000")
     page.until("along.key === 'contact.stiffness' && along.gaits?.every(({ model }) => model === 'contact')")

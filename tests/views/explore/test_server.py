@@ -135,7 +135,7 @@ def test_occupied_port_is_a_usage_error(served, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_slope_without_a_gait_is_a_valid_response(served):
+def test_slope_without_a_gait_gets_a_normal_response_with_the_reason(served):
     status, said = served.walk({"slope_deg": 20})
     assert (status, said["fixedpoint"]["error"]["exit_code"]) == (200, 4)
     assert "no gait" in said["fixedpoint"]["error"]["message"]

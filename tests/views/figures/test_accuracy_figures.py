@@ -58,7 +58,7 @@ def test_caption_states_conclusion_reference_and_failures():
         assert said in caption
 
 
-def test_caption_names_the_second_reference_of_the_reference_method():
+def test_caption_names_the_method_that_the_reference_method_is_measured_against():
     results = measured_methods()
     assert "itself is measured against" not in RIGID.render(results).caption
     results["accuracy"].summary["reference"]["rigid"] = {

@@ -40,7 +40,7 @@ def test_middle_plane_of_three_coordinates_is_drawn():
     assert "of which the middle plane is shown" in FIGURE.render(basin([0, UNREACHED], config=config)).caption
 
 
-def test_attractors_of_equal_period_have_letters():
+def test_attractors_of_equal_period_are_told_apart_by_letters():
     rows = [{"period": 1}, {"period": 3}, {"period": 3}]
     assert [attractor_name(number, rows) for number in range(3)] == [
         "gait of 1 step",
@@ -53,7 +53,7 @@ def test_cells_are_drawn_around_their_centres():
     assert sides_of(np.array([0.5, 1.5, 2.5])) == (0.0, 3.0)
 
 
-def test_missing_basin_names_its_command():
+def test_figure_without_a_basin_names_the_command_that_computes_it():
     why = FIGURE.why_left_out({}, {"basin": "it was not requested; `walkerlab basin` makes it"})
     assert why == "it needs basin: it was not requested; `walkerlab basin` makes it"
 

@@ -47,7 +47,7 @@ def test_curves_over_two_parameters_are_omitted_unless_requested():
     assert why == "continuation: no curves over two parameters (continuation.second)"
 
 
-def test_gaits_that_begin_at_a_fold_are_labelled_with_their_steps():
+def test_gaits_that_begin_at_a_fold_are_labelled_with_their_number_of_steps():
     results = families()
     branch = results["continuation"].groups["rigid/branch_1"]
     kinds = replace(branch.variables["mark_kind"], values=np.array(["fold"]))

@@ -94,7 +94,7 @@ def test_every_axis_has_a_label_with_a_unit(drawn):
 
 
 @for_all
-def test_legends_cover_no_axes(drawn):
+def test_legends_do_not_overlap_the_axes(drawn):
     assert all(axes.get_legend() is None for axes in drawn.axes)
     for legend in drawn.legends:
         box = legend.get_window_extent()

@@ -110,7 +110,7 @@ def test_models_without_a_common_step_have_no_phase_difference():
     assert why_left_out(results, {}) == {8: "compare: no step was completed by both models"}
 
 
-def test_figures_of_the_paper_are_named_by_its_numbers():
+def test_paper_figures_are_named_after_their_numbers():
     assert [figure.name for figure in PAPER_FIGURES] == [f"figure-{figure.number:02d}" for figure in PAPER_FIGURES]
     assert PAPER_FIGURES[0].reference == "figure 2"
     assert len(set(NAMES)) == len(NAMES)
@@ -298,7 +298,7 @@ def test_markers_do_not_widen_the_axes():
     assert top < 5.5
 
 
-def test_impacts_do_not_determine_the_energy_scale():
+def test_energy_peaks_at_impacts_do_not_change_the_axis_limits():
     results = both_models()
     axes = plotted(NUMBERED[10], both_models(**{"contact-sim": with_peak(results["contact-sim"])})).axes
     assert axes[2].get_ylim() == plotted(NUMBERED[10], results).axes[2].get_ylim()

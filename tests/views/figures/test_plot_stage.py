@@ -93,7 +93,7 @@ def test_figures_drawn_early_are_final_and_not_redrawn(tmp_path):
     assert artifact.indexed_files(anew) == artifact.indexed_files(final)
 
 
-def test_each_entry_has_text_and_files_of_its_figure(whole):
+def test_each_figure_entry_has_its_texts_and_existing_files(whole):
     folder, content = whole
     for entry in content.summary["figures"]:
         assert set(entry) | {"number"} == {"number", "title", "svg", "png", "caption", "alt", "results"}
@@ -118,7 +118,7 @@ def test_figures_without_results_are_omitted_with_the_reason(rigid_only):
         assert entry in left_out
 
 
-def test_figures_of_missing_results_are_removed_and_nothing_else(rigid_only):
+def test_only_figures_of_missing_results_are_removed(rigid_only):
     folder, _, _ = rigid_only
     assert "figure-06.svg" not in names(folder)
     assert (folder / "figures" / "figure-mine.svg").read_text() == "drawn before"

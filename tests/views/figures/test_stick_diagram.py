@@ -54,7 +54,7 @@ def test_plane_descends_in_walking_direction():
     assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
 
 
-def test_incomplete_cycle_is_drawn_to_its_end():
+def test_stick_diagram_of_an_incomplete_cycle_ends_where_the_walk_ends():
     results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
     sticks = read_sticks(results["simulate"])
     at_strikes, between = sticks.postures()
@@ -116,7 +116,7 @@ def of(patch, look):
     return to_hex(patch.get_edgecolor()).upper() == look.colour
 
 
-def test_ground_without_pads_is_a_plane_explained_in_the_caption():
+def test_ground_without_pads_is_drawn_as_a_plane_and_the_caption_explains_it():
     results = both_models(**{"contact-sim": contact(pads=False)})
     assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
     assert "after it has passed the stance foot" in FIGURE_6.render(results).caption
@@ -189,7 +189,7 @@ def test_walk_that_falls_in_its_first_step_has_a_film():
     assert len([*pictures(walk, times[-1:])]) == 1
 
 
-def test_film_also_shows_rough_ground_exaggerated():
+def test_film_also_exaggerates_rough_ground():
     begins, rough = np.array([-1.0, 0.2, 0.6]), np.array([0.0, 0.002, -0.001])
     even, uneven = (film_frame(rigid(), ground=np.column_stack((begins, heights))) for heights in (0.0 * rough, rough))
     red = np.round(255.0 * np.array(to_rgb(VERMILLION))).astype(np.uint8)

@@ -143,7 +143,7 @@ def test_unknown_numerical_error_is_reported_with_the_reason():
     )
 
 
-def test_compared_walks_are_printed_with_digits_and_errors():
+def test_compared_walks_are_printed_to_their_numerical_error():
     step = {"period_s": 0.8061234, "length_m": 0.3712345}
     errors = {"contact": {"step_period_s": 4e-3, "step_length_m": 4e-6, "end_time_s": 1e-3}}
     summary = {
@@ -181,7 +181,7 @@ def test_channels_without_losses_are_omitted():
 
 
 @pytest.mark.parametrize("outcome", ["walked", "fell"])
-def test_models_of_another_walker_are_compared_in_a_sentence(outcome):
+def test_answer_compares_the_outcomes_of_both_models_for_walkers_not_in_the_paper(outcome):
     step = {"period_s": 0.7, "length_m": 0.4}
     summary = {"steps": {"rigid": step, "contact": step}, "outcomes": {"rigid": "walked", "contact": outcome}}
     head = answer("compare", summary)[0]
@@ -226,7 +226,7 @@ def test_margins_of_a_start_use_mathematical_symbols():
     assert " ".join(row(lines, "both up")) == "1.1066 off-pad"
 
 
-def test_long_rows_keep_their_ends():
+def test_long_rows_of_values_are_shortened_in_the_middle():
     assert elide(list(range(11))) == list(range(11))
     assert elide(list(range(100))) == [0, 1, 2, 3, "…", 94, 95, 96, 97, 98, 99]
     (line,) = describe_summary({"values": list(range(1000))}, short=True)

@@ -85,7 +85,7 @@ def test_player_shows_knees_in_both_models(run):
     assert player.pads == ()
 
 
-def test_kneed_walk_has_figures_and_pages(run, tmp_path):
+def test_report_of_a_kneed_walk_has_its_figures_and_shows_no_missing_values(run, tmp_path):
     results, folder = run
     drawn = {figure["number"] for figure in results.summary("plot")["figures"] if "number" in figure}
     assert {2, 6, 7, 8, 9, 10} <= drawn
@@ -95,7 +95,7 @@ def test_kneed_walk_has_figures_and_pages(run, tmp_path):
     assert "Effect of the release instant" in page.text
 
 
-def test_paragraph_omits_knees_without_a_release(run):
+def test_paragraph_does_not_mention_knees_if_no_release_was_compared(run):
     results, _ = run
     compared = results.stored["compare"]
     summary = {name: value for name, value in compared.summary.items() if name != "releases"}

@@ -86,7 +86,7 @@ def test_accuracy_section_is_omitted_without_an_accuracy_result():
     assert section(Results(config(), {"fixedpoint": fixedpoint()})) is None
 
 
-def test_each_method_shows_its_shortest_time_per_error_and_its_smallest_error(made):
+def test_table_lists_run_times_for_each_error_and_the_smallest_error_of_each_method(made):
     costs = tables(made)["Shortest run time for each error, by method"]
     assert costs["rigid", "dop853"][:4] == ["0.05 (0.045 to 0.07)", "0.2 (0.18 to 0.28)", "7 × 10⁻¹⁵", "1,234"]
     assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
@@ -154,6 +154,6 @@ def test_skipped_runs_are_grouped_by_reason(made):
     assert tables(made)["Not run"]["", "rigid"] == ["scipy-bdf", "10⁻⁷ and 10⁻⁹", "too much work"]
 
 
-def test_rigid_scene_off_its_gait_is_mentioned():
+def test_introduction_says_that_the_rigid_walk_starts_off_its_gait():
     said = words("accuracy.introduction", {"repeats": 7, "rigid_velocity_factor": 0.98})
     assert "starts with angular velocities scaled by 0.98" in said

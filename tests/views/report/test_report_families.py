@@ -15,7 +15,7 @@ def test_section_is_omitted_without_families():
     assert section.section(Results(load().config)) is None
 
 
-def test_finding_states_the_stable_range_and_the_paragraph_describes_the_chaos():
+def test_families_section_states_the_stable_range_and_describes_chaos():
     made = section.section(Results(load().config, families()))
     (paragraph, table) = made.blocks
     assert "stable from 1\u00a0deg to 4\u00a0deg" in made.finding

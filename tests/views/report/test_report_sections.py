@@ -271,7 +271,7 @@ def test_other_scenes_have_the_paper_on_a_separate_page():
     assert "slope_rad 0.05" in said.text
 
 
-def test_tables_of_the_paper_are_shown_with_ours_without_empty_columns():
+def test_tables_of_the_paper_show_our_values_too_and_omit_empty_columns():
     first, third = blocks(sections()["tables"], Table)
     assert [column.title for column in first.columns] == ["symbol", "quantity", "paper", "used here", "where"]
     assert [column.title for column in third.columns] == ["quantity", "paper, MATLAB", "corrected"]
@@ -495,7 +495,7 @@ def test_gaits_have_headings_only_if_there_are_two_sets_of_equations():
     ]
 
 
-def test_config_without_contact_states_the_required_friction_once():
+def test_finding_states_the_required_friction_if_the_config_has_no_contact():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
     made = assumptions(Results(config("contact=null"), {"simulate": walk}))

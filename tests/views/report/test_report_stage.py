@@ -62,7 +62,7 @@ def test_embedded_figures_contain_no_scripts_or_links(tmp_path):
         assert part not in html
 
 
-def test_figures_have_numbers_of_the_paper_only_for_its_scene(tmp_path):
+def test_report_uses_figure_numbers_of_the_paper_only_for_the_scene_of_the_paper(tmp_path):
     departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
     inputs = {"compare": EVERYTHING["compare"](), "plot": plot(tmp_path)}
     assert run(tmp_path, inputs=inputs).summary["figures"] == ["Figure 7. Legs."]

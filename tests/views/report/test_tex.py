@@ -21,7 +21,7 @@ def cells(text):
     return [line.removesuffix(END) for line in lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")]]
 
 
-def test_decimals_are_aligned_with_equal_digits():
+def test_numbers_in_a_latex_column_have_equally_many_decimals():
     text = tex_of(0.7, 0.70638, -1.25)
     assert r"\begin{tabular}{S[table-format=-1.4]}" in text
     assert cells(text) == ["0.7000", "0.7064", "-1.2500"]
