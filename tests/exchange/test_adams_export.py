@@ -301,7 +301,7 @@ def test_bodies_keep_readable_names(tmp_path):
         ("contact", ("paper", "contact.damping=0"), "damping above 0", "functions"),
         ("functions", ("round-feet",), "only after mid-swing", "checkerboard"),
         ("functions", ("simplest",), "next to no mass", "mass"),
-        ("functions", ("paper", "ground.roughness_m=0.0005"), "Uneven ground", "--law contact"),
+        ("functions", ("paper", "ground.roughness_m=0.0005"), "uneven ground", "--law contact"),
     ],
 )
 def test_unsupported_features_are_rejected(law, walker, why, instead):

@@ -78,7 +78,7 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
 def test_point_foot_next_to_a_round_one_is_refused_with_a_radius_that_works():
     """Engines have one floor for both feet, but a point foot would need a lower one."""
     point = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0}")).config
-    with pytest.raises(ConfigError, match="the other is round") as caught:
+    with pytest.raises(ConfigError, match="small ball replaces the point foot") as caught:
         supported_scene(point, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     assert "0.0005 m" in caught.value.advice
     small = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0.0005}")).config

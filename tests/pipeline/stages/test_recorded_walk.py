@@ -225,7 +225,7 @@ def test_recording_with_five_samples_per_step_is_rejected(tmp_path):
         "time (s),angle 1 (rad),angle 2 (rad)",
         *(",".join(map(str, row)) for row in zip(time, *angle, strict=True)),
     ]
-    with pytest.raises(ConfigError, match="has no sample from"):
+    with pytest.raises(ConfigError, match="has no samples from"):
         walkerlab.read_walk(written(tmp_path, "\n".join(rows)))
 
 

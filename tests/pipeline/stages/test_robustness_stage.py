@@ -276,7 +276,7 @@ def test_both_models_report_similar_limits_for_each_leg(limping):
 
 def test_report_says_which_leg_is_disturbed(limping, rigid):
     said = said_of(limping.summary)
-    assert "after a step of leg 1 down of" in said
+    assert "after a step of leg 1 that goes down by" in said
     assert "as leg 2 begins to swing" in said
     assert "leg" not in said_of(rigid.summary).replace("leg_", "").replace("leg length", "")
     first, *_ = tables(limping.summary)

@@ -44,4 +44,4 @@ def test_thinning_is_reported():
     progress.note = told.append
     samples, ends = walk(1000)
     thin_samples(samples, ends, progress)
-    assert told[0].startswith("1000 steps: of ")
+    assert told[0].startswith("Of 51001 samples in 1000 steps, ")

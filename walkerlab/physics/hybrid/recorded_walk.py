@@ -206,7 +206,7 @@ class Recorder:
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != rigid.NO_SHANK else np.nan
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
-        self.blocks.append((strikes, before, after, knees[:taken]))
+        self.blocks.append((strikes, before, after, knees[:taken] if self.kneed else np.zeros(0)))
         self.steps += taken
         if taken:
             self.state = as_state(after[-1])
@@ -240,8 +240,10 @@ class Recorder:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after, knees = map(np.concatenate, zip(*self.blocks, strict=True))
         walker = self.walker
-        starts = np.vstack((self.start, after))[:-1]
-        lengths = rigid.compute_in_turns(walker, np.arange(len(before)), rigid.step_lengths, starts, before)
+        # Steps and starts have no names, because a long walk would keep their memory until the end.
+        lengths = rigid.compute_in_turns(
+            walker, np.arange(len(before)), rigid.step_lengths, np.vstack((self.start, after))[:-1], before
+        )
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(walker.mass) * float(walker.gravity_along * lengths.sum() - walker.gravity_down * climbed)
         driven, residual = driven_work(walker, self.tally, self.start, before, after, gravity)
