@@ -480,3 +480,13 @@ def test_mujoco_model_accepts_config_blocks_and_a_slope_option(mujoco):
     assert model.opt.gravity == pytest.approx([0.0, 0.0, -9.81])
     with pytest.raises(ConfigError, match="unknown way to express a slope"):
         walkerlab.mujoco_model("paper", slope="steep")
+
+
+def test_columns_of_unequal_length_are_rejected():
+    with pytest.raises(ConfigError, match="period_s 2, length_m 1"):
+        walkerlab.identify({"period_s": [0.7, 0.71], "length_m": [0.4]}, fit=["slope_deg"])
+
+
+def test_check_without_printed_values_asks_for_the_check_block():
+    with pytest.raises(ConfigError, match="check needs a printed gait"):
+        walkerlab.check("paper")

@@ -360,6 +360,9 @@ def identify(
     3.0
     """
     if isinstance(walk, Mapping):
+        if len({len(values) for values in walk.values()}) > 1:
+            sizes = ", ".join(f"{name} {len(values)}" for name, values in walk.items())
+            raise ConfigError(f"walk: the columns differ in length: {sizes}.", "Give columns of equal length.")
         # Write the columns to a file, so that they go through the same checks as a file and give the same messages.
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "walk.csv"

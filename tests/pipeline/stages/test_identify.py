@@ -324,6 +324,15 @@ def test_table_of_periods_alone_is_read(tmp_path):
     assert measured.lengths_m is None
 
 
+@pytest.mark.parametrize(("column", "unit"), [("length_mm", "mm"), ("touch_angle_deg", "deg")])
+def test_column_in_another_unit_is_not_ignored(tmp_path, column, unit):
+    path = tmp_path / "stopwatch.csv"
+    path.write_text(f"period_s,{column}\n0.70,21\n0.71,22\n0.70,21\n")
+    with pytest.raises(ConfigError, match=f"has a column '{column}'") as caught:
+        MeasuredFile(taken(*ask(path)).identify, taken())
+    assert f"={column} [{unit}]" in caught.value.advice
+
+
 def test_steps_in_the_docs_example_hardly_reveal_a_wrong_leg_length(gait):
     """docs/identify-mistakes.md states the difference of the log-likelihood, 0.5."""
     table = Path(__file__).parents[3] / "docs" / "downloads" / "stopwatch.csv"

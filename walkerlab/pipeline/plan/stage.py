@@ -173,6 +173,9 @@ class Stage:
         # Imported here to keep the help of the command line fast.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
+        if "check" in self.requires and config.check is None:
+            advice = "`walkerlab init FILE --check` writes one to fill in."
+            raise ConfigError(f"{target} needs a printed gait, and {message_without_block('check')}.", advice)
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
             instead = f"Add one to the config, such as the paper's, scaled by this walker's mass: {block}."

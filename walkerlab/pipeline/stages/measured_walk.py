@@ -205,13 +205,18 @@ def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, f
     """Return a quantity (steps,) and its smallest decimal place, both in SI units, or None if the table has no column
     for it.
 
-    Raises ConfigError for gaps and bad values.
+    Raises ConfigError for gaps and bad values, and for a column such as length_mm, whose unit is another one.
     """
     by_name = {normalise_name(column): column for column in table.columns}
     stem = name.rpartition("_")[0]
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:
-        return None
+        other = next((column for key, column in by_name.items() if key.startswith(f"{stem}_")), None)
+        if other is None:
+            return None
+        stated = f"{name}={other} [{other.rpartition('_')[2]}]"
+        advice = f'Name the column with its unit: --columns "{stated}". Otherwise rename or remove it.'
+        raise ConfigError(f"{table.path} has a column {other!r}, but no {name}.", advice)
     source = named_column(table, source)
     refuse_gaps(table, source, slice(None))
     values = table.columns[source]
