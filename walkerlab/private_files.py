@@ -32,8 +32,8 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder and everything in it, to other users. Delete files that others may have written, and
-    return the paths of the deleted files.
+    """Remove other users' access to a file, or to a folder and everything in it. Delete files that others may have
+    written, and return the paths of the deleted files.
 
     Raises OSError if such a file cannot be deleted.
     """
