@@ -26,7 +26,7 @@ OFFERED = {name: getattr(api, name) for name in api.__all__}
 DESCRIBED = [name for name, offer in OFFERED.items() if offer.__module__.startswith("walkerlab.api")]
 
 
-@pytest.mark.parametrize("module", ["memory", "results", "runs"])
+@pytest.mark.parametrize("module", ["memory", "models", "results", "runs"])
 def test_docstring_examples_show_the_actual_output(module, tmp_path):
     names = {**OFFERED, "folder": tmp_path}
     found = doctest.testmod(sys.modules[f"walkerlab.api.{module}"], extraglobs=names)
