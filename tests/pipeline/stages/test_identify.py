@@ -333,6 +333,12 @@ def test_column_in_another_unit_is_not_ignored(tmp_path, column, unit):
     assert f"={column} [{unit}]" in caught.value.advice
 
 
+def test_column_that_begins_like_a_quantity_but_names_no_unit_is_left_alone(tmp_path):
+    path = tmp_path / "stopwatch.csv"
+    path.write_text("period_s,length_note\n0.70,1\n0.71,2\n0.70,3\n")
+    assert next(MeasuredFile(taken(*ask(path)).identify, taken()).divisions()).lengths_m is None
+
+
 def test_steps_in_the_docs_example_hardly_reveal_a_wrong_leg_length(gait):
     """docs/identify-mistakes.md states the difference of the log-likelihood, 0.5."""
     table = Path(__file__).parents[3] / "docs" / "downloads" / "stopwatch.csv"

@@ -23,7 +23,7 @@ from walkerlab.exchange.columns import (
     unit_value,
 )
 from walkerlab.exchange.leg_angles import mend_angles, read_leg_angles
-from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
+from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording, value_in_si
 from walkerlab.exchange.touches import sums_at_jumps
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, RecordedSteps, divide_into_steps, is_plausible, sum_over_level
 from walkerlab.labels import unit_by_name
@@ -211,12 +211,13 @@ def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, f
     stem = name.rpartition("_")[0]
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:
-        other = next((column for key, column in by_name.items() if key.startswith(f"{stem}_")), None)
+        units = {key: key.removeprefix(f"{stem}_") for key in by_name if key.startswith(f"{stem}_")}
+        other = next((key for key, unit in units.items() if value_in_si(unit, STEP_KINDS[name])), None)
         if other is None:
             return None
-        stated = f"{name}={other} [{other.rpartition('_')[2]}]"
+        stated = f"{name}={by_name[other]} [{units[other]}]"
         advice = f'Name the column with its unit: --columns "{stated}". Otherwise rename or remove it.'
-        raise ConfigError(f"{table.path} has a column {other!r}, but no {name}.", advice)
+        raise ConfigError(f"{table.path} has a column {by_name[other]!r}, but no {name}.", advice)
     source = named_column(table, source)
     refuse_gaps(table, source, slice(None))
     values = table.columns[source]
